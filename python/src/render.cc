@@ -61,7 +61,7 @@ Result<Pictures> Draw(const CloudView& cloud, const ViewFlags& flags, bool trans
     const Camera& camera = cameras.cameras[v];
     LeaveIfAbandoned();
     ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, camera, options, render));
-    const std::string nothing = NothingToSee(cloud, camera, options, rasterizer.statistics().visible);
+    const std::string nothing = EmptyPictureReason(cloud, camera, options, rasterizer.statistics().visible);
     if (!nothing.empty() && empty_views++ == 0) empty = nothing;
     const Image picture = transparent ? WithAlpha(render) : std::move(render.color);
     const auto pixels = static_cast<size_t>(picture.plane());

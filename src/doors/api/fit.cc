@@ -61,8 +61,8 @@ Result<FitOutcome> FitTo(const std::filesystem::path& project, const GaussianClo
       return Error{ErrorCode::kBadArgument, "an initial extent has no effect without StartingPoints::kRandom"};
     }
   }
-  if (settings.downscale < 1 || settings.downscale > kMostDownscale) {
-    return Error{ErrorCode::kBadArgument, Cat("the downscale of a fit is 1 to ", kMostDownscale)};
+  if (settings.downscale < 1 || settings.downscale > kMaxDownscale) {
+    return Error{ErrorCode::kBadArgument, Cat("the downscale of a fit is 1 to ", kMaxDownscale)};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views,
                                OpenProject(project, {.hold_out = settings.hold_out, .downscale = settings.downscale}));

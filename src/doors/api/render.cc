@@ -9,9 +9,9 @@
 #include "core/splat_comments.h"
 #include "core/text.h"
 #include "core/world_up.h"
+#include "render/constant_cloud.h"
 #include "render/rasterizer.h"
 #include "render/shown_range.h"
-#include "render/still_cloud.h"
 
 namespace anchorsplat {
 
@@ -38,7 +38,7 @@ Result<std::vector<PinholeCamera>> Orbit(const CloudView& cloud, int count, int 
 }
 
 RenderOptions ToOptions(const CloudView& cloud, const RenderSettings& settings) {
-  RenderOptions options = OptionsFor(cloud);
+  RenderOptions options = DisplayOptions(cloud);
   options.background = settings.background;
   options.mode = ToMode(settings.rasterization).value_or(options.mode);
   if (settings.near_plane) {
@@ -55,7 +55,7 @@ Result<std::vector<Rendering>> Draw(const CloudView& cloud, std::span<const Pinh
                                     const RenderSettings& settings) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   const RenderOptions options = ToOptions(cloud, settings);
-  StillCloud still(cloud);
+  ConstantCloud still(cloud);
   Rasterizer rasterizer;
   std::vector<Camera> views;
   for (const PinholeCamera& camera : cameras) views.push_back(ToCamera(camera));
@@ -63,7 +63,7 @@ Result<std::vector<Rendering>> Draw(const CloudView& cloud, std::span<const Pinh
   Progress progress("render", static_cast<int64_t>(cameras.size()));
   const auto keep = [&](size_t k, RenderOutput& output) -> Status {
     const int64_t visible = rasterizer.statistics().visible;
-    if (const std::string nothing = NothingToSee(cloud, views[k], options, visible); !nothing.empty()) {
+    if (const std::string nothing = EmptyPictureReason(cloud, views[k], options, visible); !nothing.empty()) {
       LogWarning(nothing);
     }
     renderings.push_back({.color = ToPicture(output.color),

@@ -146,7 +146,7 @@ Status RunCompare(const CompareWords& flags, const SharedFlags& shared) {
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(Sides sides, OpenSides(flags.how, {flags.a, nullptr, nullptr},
                                                       {flags.b, nullptr, nullptr}, {flags.truth, nullptr, nullptr}));
-  if (!flags.side_by_side.empty()) ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(flags.side_by_side));
+  if (!flags.side_by_side.empty()) ANCHORSPLAT_RETURN_IF_ERROR(CheckNotInput(flags.side_by_side));
   std::vector<ViewSource*> sources = {sides.a.get()};
   if (sides.truth) sources.push_back(sides.b.get());
   ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureDistance lpips, OpenLpipsDistance(flags.lpips, flags.lpips_weights));

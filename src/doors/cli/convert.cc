@@ -135,7 +135,7 @@ Result<std::vector<Job>> Jobs(const ConvertWords& flags, bool overwrite) {
                    Cat(other->second, " and ", input, " would both become ", output.string(), ": rename one")};
     }
     // Checked for all before the first is read: a batch should not fail half-way on something known at its start.
-    for (const fs::path& file : FilesOfCloud(output, kMaxShDegree)) ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(file));
+    for (const fs::path& file : FilesOfCloud(output, kMaxShDegree)) ANCHORSPLAT_RETURN_IF_ERROR(CheckNotInput(file));
     if (!overwrite && !flags.how.edits.dry_run && Exists(output)) {
       return Error{ErrorCode::kExists, Cat(output.string(), " exists; -w replaces it")};
     }

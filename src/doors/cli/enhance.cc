@@ -161,8 +161,8 @@ OutputPlan PlanOf(const EnhanceOptions& options, const std::string& input, const
 int64_t CountOutside(const std::optional<Region>& region, const GaussianCloud& cloud) {
   int64_t outside = 0;
   if (!region) return 0;
-  const Region from_origin = FromOrigin(*region, cloud.origin);
-  for (int64_t i = 0; i < cloud.size(); ++i) outside += from_origin.Holds(cloud.means.data() + 3 * i) ? 0 : 1;
+  const Region from_origin = RelativeToOrigin(*region, cloud.origin);
+  for (int64_t i = 0; i < cloud.size(); ++i) outside += from_origin.Contains(cloud.means.data() + 3 * i) ? 0 : 1;
   return outside;
 }
 
@@ -253,7 +253,7 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
   if (options.cameras && !UpOf(enhanced.cloud.comments)) {
     if (const auto up = WorldUp(options.cameras->cameras)) enhanced.cloud.comments.push_back(UpComment(*up));
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(WriteCloudOrKeep(output, enhanced.cloud, write, extras));
+  ANCHORSPLAT_RETURN_IF_ERROR(WriteCloudOrSaveBeside(output, enhanced.cloud, write, extras));
   const EnhanceReport& r = enhanced.report;
   before.render_mode = enhanced.cloud.render_mode;  // both as it was trained
   if (flags.view) ANCHORSPLAT_RETURN_IF_ERROR(WritePage(input, before, output, enhanced, WriteOptionsFrom(shared)));

@@ -87,12 +87,14 @@ void PrintReport(const FitWords& flags, const FitReport& r) {
 
 // Each file that can be written is, whatever becomes of the other one.
 Status WriteResults(const FitWords& flags, const Fitted& fitted, bool overwrite) {
-  const Status splat = WriteCloudOrKeep(flags.output, fitted.cloud, {.overwrite = overwrite, .memory = flags.memory()});
+  const Status splat =
+      WriteCloudOrSaveBeside(flags.output, fitted.cloud, {.overwrite = overwrite, .memory = flags.memory()});
   if (flags.gsplat_checkpoint.empty()) return splat;
-  const Status checkpoint = WriteOrKeep(flags.gsplat_checkpoint, overwrite, [&](const fs::path& path, bool replace) {
-    return WriteGsplatCheckpoint(path, fitted.cloud, std::max<int64_t>(0, fitted.report.steps - 1),
-                                 {.overwrite = replace});
-  });
+  const Status checkpoint =
+      WriteOrSaveBeside(flags.gsplat_checkpoint, overwrite, [&](const fs::path& path, bool replace) {
+        return WriteGsplatCheckpoint(path, fitted.cloud, std::max<int64_t>(0, fitted.report.steps - 1),
+                                     {.overwrite = replace});
+      });
   if (checkpoint.ok()) {
     for (const std::string& loss : WriteLosses(*FormatOfName("pt"), fitted.cloud)) {
       LogWarning(Cat(flags.gsplat_checkpoint, ": ", loss));

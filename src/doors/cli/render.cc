@@ -17,9 +17,9 @@
 #include "core/text.h"
 #include "images/rendering.h"
 #include "io/input_record.h"
+#include "render/constant_cloud.h"
 #include "render/rasterizer.h"
 #include "render/shown_range.h"
-#include "render/still_cloud.h"
 #include "request/choice.h"
 #include "request/parse.h"
 #include "request/upscale_flags.h"
@@ -62,7 +62,7 @@ Result<std::vector<fs::path>> OutputPaths(const std::string& output, const Camer
       return Error{ErrorCode::kBadArgument,
                    Cat("views ", other->second, " and ", camera.name, " would both become ", paths.back().string())};
     }
-    ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(paths.back()));
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckNotInput(paths.back()));
     if (!overwrite && Exists(paths.back())) {
       return Error{ErrorCode::kExists, Cat(paths.back().string(), " exists; -w replaces it")};
     }
@@ -110,14 +110,14 @@ Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
   std::string empty;  // what is wrong with the first view that shows nothing
   int64_t empty_views = 0;
   {
-    StillCloud still(cloud);
+    ConstantCloud still(cloud);
     Rasterizer rasterizer;
     Progress progress("render", static_cast<int64_t>(paths.size()));
     Stopwatch watch;
     const auto keep = [&](size_t i, RenderOutput& render) -> Status {
       seconds += watch.Lap();
       const Camera& camera = cameras.cameras[i];
-      const std::string warning = NothingToSee(cloud, camera, options, rasterizer.statistics().visible);
+      const std::string warning = EmptyPictureReason(cloud, camera, options, rasterizer.statistics().visible);
       if (!warning.empty() && empty_views++ == 0) empty = warning;
       Image picture = flags.transparent ? WithAlpha(render) : std::move(render.color);
       if (network) {

@@ -83,7 +83,7 @@ Result<nlohmann::json> Enlarge(const BatchItem& item, Upscaler& network, const E
   const auto begin = std::chrono::steady_clock::now();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Image enlarged, EnlargePicture(network, image, options));
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(item.output));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckNotInput(item.output));
   if (const fs::path folder = fs::path(item.output).parent_path(); !folder.empty() && write.memory == nullptr) {
     std::error_code code;
     fs::create_directories(folder, code);

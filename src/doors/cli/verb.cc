@@ -129,7 +129,7 @@ int RunProgram(int argc, const char* const* argv, Trainer trainer) {
     return program.exit_code;
   } catch (const RunAbandoned&) {
     return Fail(flags, {ErrorCode::kInterrupted, "stopped; unfinished output was removed"});
-  } catch (const NoDiskRoom& none) {
+  } catch (const DiskFull& none) {
     return Fail(flags, {ErrorCode::kIo, none.what()});
   } catch (const std::bad_alloc&) {
     return Fail(flags, {ErrorCode::kIo, "out of memory"});

@@ -80,9 +80,9 @@ Result<ConvertOptions> MakeConvertOptions(const ConvertFlags& flags, bool overwr
   options.measure = flags.report;
   options.stored = {.lengths = flags.scales == "lengths",
                     .opacities = flags.opacities == "0-1",
-                    .color_of_one = flags.colors == "0-1"     ? 1.0f
-                                    : flags.colors == "0-255" ? 255.0f
-                                                              : 0.0f};
+                    .max_color = flags.colors == "0-1"     ? 1.0f
+                                 : flags.colors == "0-255" ? 255.0f
+                                                           : 0.0f};
   ANCHORSPLAT_ASSIGN_OR_RETURN(options.input_format, ParseInputFormat("--from", flags.from));
   if (flags.axes) {
     const Status axes = ParseAxes(*flags.axes, options);

@@ -119,7 +119,7 @@ void FitFlags::AddTo(CLI::App& verb) {
       ->check(CLI::Range(0, 1 << 30))
       ->capture_default_str();
   verb.add_option("--downscale", downscale, "Average N x N pixels of the pictures")
-      ->check(CLI::Range(1, kMostDownscale))
+      ->check(CLI::Range(1, kMaxDownscale))
       ->capture_default_str();
   auto* init_option = AddChoice(
       verb, "--init", init,

@@ -50,7 +50,7 @@ Result<std::vector<ViewerView>> ChooseViews(const PageFlags& flags, const Camera
     if (!flags.truth.empty()) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(const fs::path picture, FindPictureOf(flags.truth, camera, labels[i]));
       if (picture.empty()) continue;
-      if (!camera.photograph.lens.IsStraight()) {
+      if (!camera.photograph.lens.IsIdentity()) {
         return Error{
             ErrorCode::kBadArgument,
             Cat("--truth: the pictures of ", flags.cameras,
@@ -119,7 +119,8 @@ Result<ViewerPage> MakePage(const PageFlags& flags, const CameraSet* given) {
 void LookAtSplats(ViewerPage& page) {
   if (!page.views.empty()) {  // the first is where the page opens
     const GaussianCloud& after = *page.after.cloud;
-    const std::string warning = NothingToSee(after, page.views.front().camera, OptionsFor(after), std::nullopt);
+    const std::string warning =
+        EmptyPictureReason(after, page.views.front().camera, DisplayOptions(after), std::nullopt);
     if (!warning.empty()) LogWarning(warning);
   }
   if (page.pixel_size || !page.before) return;

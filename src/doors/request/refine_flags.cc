@@ -24,7 +24,7 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
       ->group(group);
   verb.add_option("--downscale", options.downscale,
                   "With --images: average N x N pixels, if the splat was fitted to smaller pictures")
-      ->check(CLI::Range(1, kMostDownscale))
+      ->check(CLI::Range(1, kMaxDownscale))
       ->capture_default_str()
       ->group(group);
   auto* steps =

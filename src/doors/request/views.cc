@@ -152,7 +152,7 @@ Result<CameraSet> MakeViews(const ViewFlags& flags, const CloudView& cloud, cons
 }
 
 Result<RenderOptions> MakeRenderOptions(const ViewFlags& flags, const CloudView& cloud, const CameraSet& cameras) {
-  RenderOptions options = OptionsFor(cloud);
+  RenderOptions options = DisplayOptions(cloud);
   const auto beyond = [](const std::optional<double>& plane) { return plane && !(*plane > 0 && *plane <= kNoFar); };
   if (beyond(flags.near_plane) || beyond(flags.far_plane)) {
     return Error{ErrorCode::kBadArgument, "--near and --far must be above 0 (world units)"};

@@ -418,7 +418,7 @@ Result<Engine::Answer> Engine::Render(const Json& request) {
   Progress progress("render", static_cast<int64_t>(views));
   for (size_t v = 0; v < views; ++v) {
     ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, cameras.cameras[v], options, render));
-    const std::string nothing = NothingToSee(cloud, cameras.cameras[v], options, rasterizer.statistics().visible);
+    const std::string nothing = EmptyPictureReason(cloud, cameras.cameras[v], options, rasterizer.statistics().visible);
     if (!nothing.empty()) LogWarning(nothing);
     const Image picture = transparent ? WithAlpha(render) : std::move(render.color);
     float* const to = floats_.data() + v * static_cast<size_t>(plane) * channels;

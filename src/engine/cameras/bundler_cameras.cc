@@ -26,7 +26,7 @@ namespace {
 constexpr std::string_view kBundlerHead = "# Bundle file v0.";
 constexpr uint64_t kMostListBytes = uint64_t{64} << 20;
 
-// Numbers between blanks and ends of lines.
+// Parses numbers separated by whitespace.
 class BundlerText {
  public:
   BundlerText(std::string name, std::string_view text) : name_(std::move(name)), rest_(text) {}
@@ -69,7 +69,7 @@ struct BundlerCamera {
   Pose pose;                         // OpenCV's axes
 };
 
-// A number has a blank behind it, so that a count is bounded by what the file has.
+// A number is followed by whitespace, which bounds counts by the file size.
 constexpr uint64_t kNumbersPerCamera = 15;
 
 Result<std::vector<BundlerCamera>> BundlerCameras(BundlerText& text) {
@@ -91,8 +91,8 @@ Result<std::vector<BundlerCamera>> BundlerCameras(BundlerText& text) {
     for (double& x : t) ANCHORSPLAT_RETURN_IF_ERROR(text.Take("a number of the translation", x));
     if (camera.focal == 0) continue;
     if (!(camera.focal > 0)) return text.Complain(Cat("focal length ", camera.focal, ", expected a positive number"));
-    for (size_t i = 3; i < 9; ++i) r[i] = -r[i];  // from y up, z backward
-    // Only to see that it is a rotation.
+    for (size_t i = 3; i < 9; ++i) r[i] = -r[i];  // from axes y up, z backward
+    // Only checks that it is a rotation.
     const auto checked = PoseFromCameraToWorld({r[0], r[3], r[6], r[1], r[4], r[7], r[2], r[5], r[8]}, {0, 0, 0});
     if (!checked.ok()) return text.Complain(checked.error().message);
     camera.pose = {NearestRotation(r), {t[0], -t[1], -t[2]}};
@@ -100,7 +100,7 @@ Result<std::vector<BundlerCamera>> BundlerCameras(BundlerText& text) {
   return cameras;
 }
 
-// Files that may list the pictures, in the order in which they are looked for.
+// Candidate image lists, in search order.
 std::vector<std::filesystem::path> Lists(const std::filesystem::path& file) {
   const std::filesystem::path folder = file.parent_path();
   std::string stem = file.stem().string();
@@ -114,7 +114,7 @@ std::vector<std::filesystem::path> Lists(const std::filesystem::path& file) {
   return lists;
 }
 
-// A line is a path, behind which Bundler's own tools put "0" and a focal length from EXIF.
+// A line is a path, to which Bundler's tools append "0" and a focal length from EXIF.
 std::string PathOfLine(std::string_view line) {
   line = Trimmed(line);
   const size_t last = line.rfind(' ');
@@ -173,13 +173,14 @@ Result<CameraSet> CamerasFromBundler(const std::filesystem::path& file, std::str
   CameraSet set;
   size_t registered = 0;
   std::string first_missing;
-  std::map<std::array<double, 5>, LensedPinhole> known;  // by size, focal length and lens
+  std::map<std::array<double, 5>, LensedPinhole> known;  // by size, focal length, k1 and k2
   for (size_t i = 0; i < cameras.size(); ++i) {
     const BundlerCamera& camera = cameras[i];
     if (camera.focal == 0) continue;
     ++registered;
     const std::filesystem::path& picture = pictures[i].file;
-    if (!pictures[i].unclear.empty()) return Error{ErrorCode::kBadArgument, pictures[i].unclear};  // its size is in it
+    // the size comes from the image
+    if (!pictures[i].ambiguity.empty()) return Error{ErrorCode::kBadArgument, pictures[i].ambiguity};
     if (!IsFile(picture)) {
       if (first_missing.empty()) first_missing = picture.string();
       continue;
@@ -188,8 +189,8 @@ Result<CameraSet> CamerasFromBundler(const std::filesystem::path& file, std::str
     const std::array<double, 5> key = {static_cast<double>(size.width), static_cast<double>(size.height), camera.focal,
                                        camera.k1, camera.k2};
     if (!known.contains(key)) {
-      const Pinhole bent{size.width, size.height, camera.focal, camera.focal, 0.5 * size.width, 0.5 * size.height};
-      auto through = ThroughLens({.model = LensModel::kRadial, .radial = {camera.k1, camera.k2, 0, 0}}, bent);
+      const Pinhole distorted{size.width, size.height, camera.focal, camera.focal, 0.5 * size.width, 0.5 * size.height};
+      auto through = ThroughLens({.model = LensModel::kRadial, .radial = {camera.k1, camera.k2, 0, 0}}, distorted);
       if (!through.ok()) {
         return Error{through.error().code,
                      Cat(file.string(), ": camera ", i, " (", Printable(names[i]), "): ", through.error().message)};
@@ -197,7 +198,7 @@ Result<CameraSet> CamerasFromBundler(const std::filesystem::path& file, std::str
       known[key] = *std::move(through);
     }
     const LensedPinhole& lensed = known[key];
-    Camera view{pictures[i].name, picture, lensed.straight, camera.pose, lensed.photograph};
+    Camera view{pictures[i].name, picture, lensed.undistorted, camera.pose, lensed.photograph};
     view.photograph.mask = pictures[i].mask;
     set.cameras.push_back(std::move(view));
   }

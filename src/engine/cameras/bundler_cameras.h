@@ -9,19 +9,19 @@
 
 namespace anchorsplat {
 
-// Whether these first bytes of a file are those of a Bundler reconstruction.
+// Whether a file with these first bytes is a Bundler reconstruction.
 bool LooksLikeBundler(std::string_view head);
 
-// Cameras of a Bundler reconstruction (Snavely 2006; RealityCapture, COLMAP and others export it, too), bundle.out of
-// version 0.3 or 0.4: focal length, k1, k2, and world-to-camera axes of which x points right, y up and z backward.
+// Reads cameras of a Bundler reconstruction (Snavely 2006; also exported by RealityCapture, COLMAP and others),
+// bundle.out of version 0.3 or 0.4: focal length, k1, k2, and world-to-camera axes with x right, y up, z backward.
 // Cameras with focal length 0 are not registered; a message counts them.
 //
-// Names are the lines of the list of pictures: for bundle.out list.txt, for SCAN.bundle.out SCAN.list.txt, for SCAN.out
-// SCAN.list.txt, SCAN-list.txt or SCAN.txt, else list.txt; beside the file, else in the folder above. The file says no
-// sizes: they are the pictures', which are looked for below the list's folder, in its `images` and in `images` beside
-// it. Cameras without a picture are left out with a warning.
+// Names come from an image list: for bundle.out list.txt, for SCAN.bundle.out SCAN.list.txt, for SCAN.out
+// SCAN.list.txt, SCAN-list.txt or SCAN.txt, else list.txt; in the file's folder, else in its parent. Image sizes come
+// from the images, searched below the list's folder, in its `images` and in `images` beside it. Cameras without an
+// image are dropped with a warning.
 //
-// Errors: kNotFound without a list, or where none of the pictures is found; kBadFile with the line.
+// Errors: kNotFound: no list, or none of the images exists; kBadFile with the line.
 Result<CameraSet> CamerasFromBundler(const std::filesystem::path& file, std::string_view bytes);
 
 }  // namespace anchorsplat

@@ -21,7 +21,7 @@ Vec3 AxisOf(const Camera& camera, size_t axis) {
   return {r[3 * axis], r[3 * axis + 1], r[3 * axis + 2]};
 }
 
-// The point nearest to all the lines that the cameras look along; nothing where these are all but parallel.
+// The point nearest to all viewing axes; none if they are nearly parallel.
 std::optional<Vec3> MeetingPoint(std::span<const Camera> cameras) {
   double a[3][3] = {};
   Vec3 b{};
@@ -56,7 +56,7 @@ std::optional<Vec3> MeetingPoint(std::span<const Camera> cameras) {
 
 bool AllLookAway(std::span<const Camera> cameras) {
   constexpr size_t kFewest = 3;
-  constexpr double kAway = -0.7;  // cosine: 45 degrees about the way back
+  constexpr double kAway = -0.7;  // cosine: within 45 degrees of facing away
   if (cameras.size() < kFewest) return false;
   const auto point = MeetingPoint(cameras);
   if (!point) return false;
@@ -68,7 +68,7 @@ bool AllLookAway(std::span<const Camera> cameras) {
   });
 }
 
-// Worlds with z up are common; with z down nobody has them.
+// Worlds with z up are common, with z down they are not.
 bool IsUprightInZ(std::span<const Camera> cameras) {
   constexpr double kUpright = 0.7;
   double up = 0;
@@ -76,7 +76,7 @@ bool IsUprightInZ(std::span<const Camera> cameras) {
   return up > kUpright;
 }
 
-// How much of the points the cameras see, as they are and the other way round.
+// Fractions of the points that the cameras see as they are, and turned around.
 struct Seen {
   double read = 0, turned = 0;
 };
@@ -114,7 +114,7 @@ std::string WrongAxes(const CameraSet& set, std::span<const float> points) {
         " cameras look away from the middle between them; if they should look at it, the file has OpenCV's axes: ",
         kRemedy);
   }
-  // Within a room cameras that look outwards see less of it than the other way, but some of it.
+  // Indoors, cameras facing outwards see less of the room than when turned around, but they do see some of it.
   constexpr double kEnough = 0.05, kClear = 5, kSome = 0.01;
   const Seen seen = CountSeen(set.cameras, points);
   if (seen.turned < kEnough || seen.turned < kClear * seen.read) return "";

@@ -7,11 +7,10 @@
 
 namespace anchorsplat {
 
-// A transforms.json holds camera-to-world matrices in OpenGL's axes; some programs write OpenCV's, and every camera
-// then looks the other way. What speaks for that, as the end of a sentence that says what to do; empty where nothing
-// does. `points` [N,3], world: what the cameras are to see, where it is known. Without it, cameras that all look away
-// from the point that their views' axes meet in are suspicious; those of a room, with z up as they should have it, are
-// not.
+// Detects a transforms.json with OpenCV camera-to-world matrices instead of OpenGL ones, which turn every camera
+// around. Returns the evidence and what to do, as the end of a sentence; empty if there is none. `points` [N,3], world:
+// scene points, if known. Without them, cameras are suspicious if all face away from the point nearest to their viewing
+// axes; indoor captures with z up, as is correct, are not.
 std::string WrongAxes(const CameraSet& set, std::span<const float> points);
 
 }  // namespace anchorsplat

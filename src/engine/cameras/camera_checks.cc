@@ -19,7 +19,7 @@ namespace {
 
 Error Bad(std::string sentence) { return Error{ErrorCode::kBadFile, std::move(sentence)}; }
 
-constexpr double kLeastNorm = 0.5;  // what is farther from 1 is another column than that of a quaternion
+constexpr double kLeastNorm = 0.5;  // a norm farther from 1 is not a quaternion's
 
 double NormOf(const std::array<double, 4>& q) {
   return std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
@@ -56,16 +56,16 @@ Result<Pose> PoseFromQuaternion(const std::array<double, 4>& q, const std::array
 }
 
 void QuaternionNorms::Add(const std::array<double, 4>& quaternion) {
-  constexpr double kTolerance = 1e-3;  // files with few digits
+  constexpr double kTolerance = 1e-3;  // allows files with few digits
   const double norm = NormOf(quaternion);
   if (std::abs(norm - 1) <= kTolerance) return;
-  ++others_;
+  ++off_norm_;
   if (std::abs(norm - 1) > std::abs(farthest_ - 1)) farthest_ = norm;
 }
 
-void QuaternionNorms::Tell(const std::filesystem::path& file) const {
-  if (others_ == 0) return;
-  LogWarning(Cat(file.string(), ": ", others_, others_ == 1 ? " quaternion is" : " quaternions are",
+void QuaternionNorms::Report(const std::filesystem::path& file) const {
+  if (off_norm_ == 0) return;
+  LogWarning(Cat(file.string(), ": ", off_norm_, off_norm_ == 1 ? " quaternion is" : " quaternions are",
                  " not of norm 1 (the farthest has ", farthest_, "); only the direction was taken"));
 }
 
@@ -81,7 +81,7 @@ std::filesystem::path FindPicture(std::span<const std::filesystem::path> folders
     for (const char* extension : {"", ".png", ".jpg", ".jpeg"}) {
       auto path = (folder / (relative + extension)).lexically_normal();
       if (!IsFile(path)) continue;
-      RecordInput(path);  // the pictures are a part of what the cameras are read from, whoever opens them
+      RecordInput(path);  // images count as inputs, whoever opens them
       return path;
     }
   }

@@ -11,42 +11,45 @@
 
 namespace anchorsplat {
 
-// Checks that all camera readers share. Their messages are the end of a sentence: the reader puts file and place
-// before.
+// Checks shared by all camera readers. Messages are the end of a sentence; the reader prepends file and position.
+//
+// Requires a size of at least 1 and within the limits of core/image.h, positive finite focal lengths, and a finite
+// principal point. Error: kBadFile.
 
 // Sizes at least 1 and no more pixels than a picture may have, focal lengths positive and finite, principal point
 // finite. kBadFile.
 Status CheckIntrinsics(const Pinhole& intrinsics);
 
-// From camera-to-world in OpenCV axes. kBadFile when it is not a rotation or something is not finite.
+// Pose from camera-to-world in OpenCV axes. kBadFile: not a rotation, or a value is not finite.
 Result<Pose> PoseFromCameraToWorld(const std::array<double, 9>& rotation, const std::array<double, 3>& center);
 
-// From world-to-camera. kBadFile as above; the quaternion (wxyz) is normalised, and has a norm near 1.
+// Pose from world-to-camera. The quaternion (wxyz), of norm near 1, is normalised. Errors as above.
 Result<Pose> PoseFromQuaternion(const std::array<double, 4>& quaternion, const std::array<double, 3>& translation);
 
-// One message for a file whose quaternions are not of norm 1, as they should be: they are taken as if they were.
+// Collects quaternions whose norm is not 1, which are normalised, for one message per file.
 class QuaternionNorms {
  public:
   void Add(const std::array<double, 4>& quaternion);
-  void Tell(const std::filesystem::path& file) const;
+  void Report(const std::filesystem::path& file) const;
 
  private:
-  size_t others_ = 0;
+  size_t off_norm_ = 0;
   double farthest_ = 1;
 };
 
-// "./train/r_0.png" → "train/r_0": the camera's name. Only extensions of pictures go, as "r_0.5" has none; '\\' is '/'.
+// Camera name of an image path: "./train/r_0.png" → "train/r_0". '\\' becomes '/', and only image extensions are
+// removed ("r_0.5" has none).
 std::string ViewName(const std::string& image_path);
 
-// The first of `folder/relative` that is a file, where .png, .jpg and .jpeg are tried when there is none as such; empty
-// if there is none at all. For what this program has written; other programs' paths are for FindPictures.
+// The first existing file `folder/relative`, also tried with .png, .jpg and .jpeg; empty if there is none. For paths
+// that this program wrote; FindPictures handles other programs' paths.
 std::filesystem::path FindPicture(std::span<const std::filesystem::path> folders, const std::string& relative);
 
-// Where a file in `folder` that names its pictures alone has them: `images` in it, itself, `images` beside it.
+// Folders to search if a camera file in `folder` gives bare image names: its `images`, itself, and `images` beside it.
 std::vector<std::filesystem::path> FoldersOfPictures(const std::filesystem::path& folder);
 
-// The mask of a picture: `masks` beside the folder that pictures are looked for in, or within it, holds NAME.EXT.png as
-// COLMAP has it, or NAME.png; empty if there is none.
+// The mask of an image: NAME.EXT.png (as in COLMAP) or NAME.png in a folder `masks` beside or within one of `folders`;
+// empty if there is none.
 std::filesystem::path FindMask(std::span<const std::filesystem::path> folders, const std::string& relative);
 
 }  // namespace anchorsplat

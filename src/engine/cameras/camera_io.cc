@@ -37,8 +37,8 @@ std::string NotOfNerfstudio(const std::filesystem::path& frame) {
              " says nothing of these cameras; give those that it was trained with, or move that file away");
 }
 
-// `complete`: CamerasFromTransforms'. `frame`: the dataparser_transforms.json that says where to; empty: the cameras
-// stay in the world of their file.
+// `complete`: see CamerasFromTransforms. `frame`: a dataparser_transforms.json to apply; empty: cameras stay in the
+// world of their file.
 Result<CameraSet> CamerasFromJson(const JsonValue& root, const std::filesystem::path& folder, bool complete,
                                   const std::filesystem::path& frame) {
   if (const std::string foreign = ForeignJson(root); !foreign.empty()) return root.Complain(foreign);
@@ -62,12 +62,12 @@ Result<CameraSet> CamerasFromJson(const JsonValue& root, const std::filesystem::
   return set;
 }
 
-// Of any file of cameras but NumPy's, by what it begins with.
+// Detects the type of a camera file, except NumPy's, by its first bytes.
 Result<CameraSet> CamerasFromBytes(const std::filesystem::path& file, std::string_view bytes,
                                    const std::filesystem::path& folder, bool complete,
                                    const std::filesystem::path& frame) {
   std::string_view head = bytes.substr(0, kHeadBytes);
-  if (head.starts_with("\xEF\xBB\xBF")) head.remove_prefix(3);  // of UTF-8, which XML and JSON may begin with
+  if (head.starts_with("\xEF\xBB\xBF")) head.remove_prefix(3);  // UTF-8 byte order mark, allowed in XML and JSON
   head.remove_prefix(std::min(head.find_first_not_of(" \t\r\n"), head.size()));
   if (!head.starts_with('{') && !head.starts_with('[')) {
     const std::string foreign = ForeignCameras(file, head);
@@ -88,7 +88,7 @@ Result<CameraSet> ReadCameraFile(const std::filesystem::path& path, const std::f
     if (!frame.empty()) return Error{ErrorCode::kBadFile, Cat(path.string(), ": ", NotOfNerfstudio(frame))};
     return ReadPosesBounds(path);
   }
-  // Projects may be far larger than any file of cameras.
+  // Project files may be far larger than camera files.
   if (const std::string foreign = ForeignCameras(path); !foreign.empty() && IsFile(path)) {
     return Error{ErrorCode::kBadFile, Cat(path.string(), ": ", foreign)};
   }
@@ -103,7 +103,7 @@ Result<CameraSet> ReadModel(const std::filesystem::path& model, const std::files
   return set;
 }
 
-// The first bytes of a file of a folder; none where it cannot be read.
+// First bytes of a file in a folder; empty if unreadable.
 std::string HeadOf(const std::filesystem::path& path) {
   std::string head(kHeadBytes, '\0');
   std::ifstream file(path, std::ios::binary);
@@ -115,14 +115,14 @@ std::string HeadOf(const std::filesystem::path& path) {
 bool IsCameraFile(const std::filesystem::path& path) {
   const std::string name = path.filename().string();
   if (name == "reconstruction.json") return true;
-  // OpenDroneMap's has the lenses alone.
+  // OpenDroneMap's contains only lenses.
   if (name == "cameras.json") return HeadOf(path).find("\"projection_type\"") == std::string::npos;
   if (name.ends_with(".json")) return name.starts_with("transforms");
   if (name.ends_with(".xml")) return IsFile(path) && LooksLikeMetashape(HeadOf(path));
   return name.ends_with(".out") && IsFile(path) && LooksLikeBundler(HeadOf(path));
 }
 
-// Files of cameras in a folder, sorted. OpenDroneMap and Bundler have them one folder further down.
+// Camera files in a folder, sorted. OpenDroneMap and Bundler keep them one folder deeper.
 Result<std::vector<std::filesystem::path>> FindCameraFiles(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> found;
   std::error_code code;
@@ -137,12 +137,12 @@ Result<std::vector<std::filesystem::path>> FindCameraFiles(const std::filesystem
   return found;
 }
 
-// Whether a model lies where COLMAP's and INRIA's projects have theirs.
+// Whether a model is at its usual place in COLMAP and INRIA projects.
 bool IsPlainProject(const std::filesystem::path& project, const std::filesystem::path& model) {
   return model == project || model == project / "sparse" || model.parent_path() == project / "sparse";
 }
 
-// Models of one capture that COLMAP could not join have worlds of their own, and cannot be put together here either.
+// Models that COLMAP could not join have separate worlds and cannot be joined here either.
 void TellOfOtherModels(const std::filesystem::path& project, std::span<const FoundModel> models) {
   if (models.size() < 2) return;
   const auto pictures = [](size_t count) { return Cat(count, count == 1 ? " picture" : " pictures"); };
@@ -160,7 +160,7 @@ void TellOfOtherModels(const std::filesystem::path& project, std::span<const Fou
   }
 }
 
-// Beside a file, or a COLMAP model or the two folders above it; empty where there is none.
+// Beside a file, a COLMAP model or up to two folders above it; empty if there is none.
 std::filesystem::path FrameBeside(const std::filesystem::path& folder, int above) {
   std::filesystem::path up = folder.empty() ? std::filesystem::path(".") : folder;
   for (int i = 0; i <= above; ++i, up /= "..") {
@@ -169,14 +169,14 @@ std::filesystem::path FrameBeside(const std::filesystem::path& folder, int above
   return {};
 }
 
-// `frame`: of nerfstudio's run that leads here; empty: what lies beside the cameras, if anything.
+// `frame`: of the nerfstudio run that led here; empty: use the one beside the cameras, if any.
 Result<CameraSet> ReadCameraFolder(const std::filesystem::path& folder, std::filesystem::path frame) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<std::filesystem::path> candidates, FindCameraFiles(folder));
-  // Models that a program keeps beside its own file, as nerfstudio does in colmap, are not what it was meant to give.
+  // A model inside a program's data, as nerfstudio's colmap, is not what the user meant.
   std::vector<FoundModel> models = FindColmapModels(folder);
   if (!candidates.empty() && !models.empty() && !IsPlainProject(folder, models[0].folder)) models.clear();
   if (!models.empty()) candidates.push_back(models[0].folder);
-  // LLFF makes its file from a COLMAP model, which knows the lens and the points, too.
+  // LLFF derives its file from a COLMAP model, which also has lens and points.
   if (candidates.empty() && Exists(folder / "poses_bounds.npy")) candidates.push_back(folder / "poses_bounds.npy");
   const std::filesystem::path own_frame = FrameBeside(folder, 0);
   if (candidates.empty() && frame.empty() && !own_frame.empty()) {
@@ -205,7 +205,7 @@ Result<CameraSet> ReadCameraFolder(const std::filesystem::path& folder, std::fil
   return ReadModel(candidates[0], frame);
 }
 
-// A folder of masks beside the pictures or among them, by any spelling; empty where there is none.
+// A folder of masks beside or among the images, in any spelling; empty if there is none.
 std::filesystem::path MasksBeside(const std::filesystem::path& picture) {
   for (const auto& folder : {picture.parent_path(), picture.parent_path().parent_path()}) {
     std::error_code code;
@@ -219,7 +219,7 @@ std::filesystem::path MasksBeside(const std::filesystem::path& picture) {
   return {};
 }
 
-// Masks that were meant for these views and are not found are a mistake that nothing else tells.
+// Masks for these views that are not found would otherwise go unnoticed.
 void WarnOfMissingMasks(const CameraSet& set) {
   const Camera* bare = nullptr;
   size_t pictures = 0, masked = 0;
@@ -243,7 +243,7 @@ void WarnOfMissingMasks(const CameraSet& set) {
   }
 }
 
-// Readers leave the path at which they looked for a picture in vain; the first of these.
+// The first missing image; readers leave the path they tried.
 std::filesystem::path ForgetMissing(CameraSet& set) {
   std::filesystem::path first;
   for (Camera& camera : set.cameras) {
@@ -259,7 +259,7 @@ Result<CameraSet> ReadAnyCameras(const std::filesystem::path& path) {
   if (IsFolder(path)) return ReadCameraFolder(path, {});
   const std::string name = path.filename().string();
   if (name == kNerfstudioFrame && Exists(path)) return ReadCameraFolder(folder, {});
-  // Any file of a COLMAP model stands for the model.
+  // Any file of a COLMAP model means the model.
   const bool colmap = name == "cameras.bin" || name == "images.bin" || name == "cameras.txt" || name == "images.txt";
   if (colmap && Exists(path)) {
     if (IsColmapModel(folder)) return ReadModel(folder, FrameBeside(folder, 2));
@@ -278,9 +278,9 @@ Result<CameraSet> ParseCameras(const std::string& name, std::string_view bytes, 
 }
 
 Result<CameraSet> ReadCameras(const std::filesystem::path& path, std::filesystem::path* missing) {
-  const UnclearPictures unclear;
+  const AmbiguousPictures ambiguous;
   ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadAnyCameras(path));
-  if (missing != nullptr && !unclear.first().empty()) return Error{ErrorCode::kBadArgument, unclear.first()};
+  if (missing != nullptr && !ambiguous.first().empty()) return Error{ErrorCode::kBadArgument, ambiguous.first()};
   const std::filesystem::path first = ForgetMissing(set);
   if (missing != nullptr) *missing = first;
   WarnOfMissingMasks(set);

@@ -15,7 +15,7 @@ namespace {
 
 constexpr uint64_t kSmallestImage = 4 + 7 * 8 + 4 + 1 + 8;  // no name, no points
 
-// A little-endian file read from front to back. Every read is checked against what is left.
+// Sequential reader of a little-endian file. Every read is checked against the remaining size.
 class ByteStream {
  public:
   static Result<ByteStream> Open(const std::filesystem::path& path) {
@@ -35,7 +35,7 @@ class ByteStream {
     return {};
   }
 
-  // Up to a zero byte, which is taken too.
+  // Reads up to and including a zero byte.
   Status ReadName(std::string& out) {
     constexpr size_t kLongestPath = 4096;  // Linux's PATH_MAX
     out.clear();
@@ -49,7 +49,7 @@ class ByteStream {
     }
   }
 
-  // A count of things of at least `size` bytes each that must still follow.
+  // Reads the count of records of at least `size` bytes each, which must fit into the rest of the file.
   Status ReadCount(uint64_t& count, uint64_t size, const char* what) {
     ANCHORSPLAT_RETURN_IF_ERROR(Read(count, what));
     if (count > left() / size) {
@@ -60,7 +60,7 @@ class ByteStream {
   }
 
   Status Skip(uint64_t bytes) {
-    if (bytes == 0) return {};  // seeking throws the read-ahead away
+    if (bytes == 0) return {};  // seeking discards the read-ahead
     position_ += bytes;
     if (fseeko(file_.handle.get(), static_cast<off_t>(position_), SEEK_SET) != 0) return Complain("cannot be read");
     return {};
@@ -91,7 +91,7 @@ class ByteStream {
   uint64_t position_ = 0;
 };
 
-// Behind the last record there is nothing in a sound file: leftovers mean that we have read something else.
+// A sound file ends after the last record; trailing bytes mean that it was misread.
 Status ExpectEnd(const ByteStream& stream) {
   if (stream.left() == 0) return {};
   return stream.Complain(
@@ -149,7 +149,7 @@ Result<std::vector<Camera>> ReadColmapImagesBinary(const std::filesystem::path& 
     ANCHORSPLAT_RETURN_IF_ERROR(stream.Skip(points * kPoint));
   }
   ANCHORSPLAT_RETURN_IF_ERROR(ExpectEnd(stream));
-  norms.Tell(path);
+  norms.Report(path);
   return views;
 }
 
@@ -162,7 +162,7 @@ Result<size_t> CountColmapImagesBinary(const std::filesystem::path& path) {
 
 Result<std::vector<ColmapPoint>> ReadColmapPointsBinary(const std::filesystem::path& path) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(ByteStream stream, ByteStream::Open(path));
-  constexpr uint64_t kSmallestPoint = 8 + 3 * 8 + 3 + 8 + 8;  // seen in no image
+  constexpr uint64_t kSmallestPoint = 8 + 3 * 8 + 3 + 8 + 8;  // without a track
   constexpr uint64_t kTrackElement = 4 + 4;
   uint64_t count = 0;
   ANCHORSPLAT_RETURN_IF_ERROR(stream.ReadCount(count, kSmallestPoint, "the number of points"));

@@ -17,8 +17,8 @@ namespace {
 
 // COLMAP's src/colmap/sensor/models.h.
 constexpr ColmapCameraModel kModels[] = {
-    {0, "SIMPLE_PINHOLE", 1, 3, LensModel::kStraight, true},
-    {1, "PINHOLE", 2, 4, LensModel::kStraight, true},
+    {0, "SIMPLE_PINHOLE", 1, 3, LensModel::kNone, true},
+    {1, "PINHOLE", 2, 4, LensModel::kNone, true},
     {2, "SIMPLE_RADIAL", 1, 4, LensModel::kRadial, true},
     {3, "RADIAL", 1, 5, LensModel::kRadial, true},
     {4, "OPENCV", 2, 8, LensModel::kRadial, true},
@@ -37,8 +37,8 @@ PicturePlaces PlacesOfModel(const std::filesystem::path& folder) {
   PicturePlaces places;
   places.project = ProjectAbove(folder);
   places.complete = true;
-  // INRIA's convert.py has the model of the pictures as they were taken in PROJECT/distorted, those in PROJECT/input,
-  // and undistorted ones in PROJECT/images.
+  // INRIA's convert.py keeps the model of the original images in PROJECT/distorted, these in PROJECT/input, and
+  // undistorted ones in PROJECT/images.
   const std::string relative = AbsolutePath(folder).lexically_relative(AbsolutePath(places.project)).string();
   places.originals = relative.starts_with("distorted");
   std::vector<std::filesystem::path> usual = {folder / "images", folder / "../images", folder / "../../images"};
@@ -51,8 +51,7 @@ PicturePlaces PlacesOfModel(const std::filesystem::path& folder) {
   return places;
 }
 
-// The models in a folder whose names begin with `called`, not below that; by their names, numbers as such: "2" before
-// "10".
+// Models directly in a folder whose names begin with `called`, sorted by name with numbers in numeric order.
 std::vector<std::filesystem::path> ModelsIn(const std::filesystem::path& folder, const std::string& called) {
   std::vector<std::filesystem::path> models;
   std::error_code code;
@@ -83,15 +82,15 @@ const ColmapCameraModel* FindColmapCameraModel(const std::string& name) {
 Result<LensedPinhole> CameraFromColmap(const ColmapCameraModel& model, uint64_t width, uint64_t height,
                                        std::span<const double> params) {
   const std::string undistort = "; undistort the images first, e.g. colmap image_undistorter";
-  const std::span<const double> bent = params.subspan(model.focals + 2);
-  if (!model.undone) {
+  const std::span<const double> coefficients = params.subspan(model.focals + 2);
+  if (!model.supports_distortion) {
     if (model.lens == LensModel::kFisheye) {
       return BadModel(Cat("camera model ", model.name, " is not a lens that is known here", undistort));
     }
-    for (const double distortion : bent) {
-      if (distortion == 0) continue;
+    for (const double coefficient : coefficients) {
+      if (coefficient == 0) continue;
       return BadModel(
-          Cat("lens distortion ", distortion, " of camera model ", model.name, " is not supported", undistort));
+          Cat("lens distortion ", coefficient, " of camera model ", model.name, " is not supported", undistort));
     }
   }
   if (width > kMaxImageSide || height > kMaxImageSide) {
@@ -99,18 +98,19 @@ Result<LensedPinhole> CameraFromColmap(const ColmapCameraModel& model, uint64_t 
   }
   const Pinhole c{static_cast<int>(width),  static_cast<int>(height), params[0],
                   params[model.focals - 1], params[model.focals],     params[model.focals + 1]};
-  if (!model.undone) return ThroughLens({}, c);
+  if (!model.supports_distortion) return ThroughLens({}, c);
   Lens lens{.model = model.lens};
-  const bool tangential = model.lens == LensModel::kRadial && bent.size() >= 4;  // OPENCV, FULL_OPENCV: k1 k2 p1 p2 …
-  for (size_t i = 0; i < bent.size(); ++i) {
+  const bool tangential =
+      model.lens == LensModel::kRadial && coefficients.size() >= 4;  // OPENCV, FULL_OPENCV: k1 k2 p1 p2 …
+  for (size_t i = 0; i < coefficients.size(); ++i) {
     if (!tangential || i < 2) {
-      lens.radial[i] = bent[i];
+      lens.radial[i] = coefficients[i];
     } else if (i < 4) {
-      lens.tangential[i - 2] = bent[i];
+      lens.tangential[i - 2] = coefficients[i];
     } else if (i == 4) {
-      lens.radial[2] = bent[i];
+      lens.radial[2] = coefficients[i];
     } else {
-      lens.denominator[i - 5] = bent[i];
+      lens.denominator[i - 5] = coefficients[i];
     }
   }
   return ThroughLens(lens, c);
@@ -123,13 +123,14 @@ Result<Camera> ViewFromColmap(const ColmapImage& image, const ColmapCameras& cam
   if (camera == cameras.end()) return BadModel(Cat(who, "camera ", image.camera, " is not in the list of cameras"));
   auto pose = PoseFromQuaternion(image.quaternion, image.translation);
   if (!pose.ok()) return BadModel(who + pose.error().message);
-  return Camera{ViewName(image.name), image.name, camera->second.straight, *std::move(pose), camera->second.photograph};
+  return Camera{ViewName(image.name), image.name, camera->second.undistorted, *std::move(pose),
+                camera->second.photograph};
 }
 
 std::vector<FoundModel> FindColmapModels(const std::filesystem::path& project) {
   std::vector<FoundModel> found, others;
-  // Where models are there at several of these, they are stages of one reconstruction: the project's sparse is its
-  // result, the text files beside it are what it was given. One with as many pictures is the same in another form.
+  // Several of these are stages of one reconstruction: the project's sparse is the result, text files beside it are its
+  // input. A model with as many images is the same in another form.
   const auto take = [&](const std::filesystem::path& folder, const std::string& called) {
     std::vector<std::filesystem::path> models = ModelsIn(folder, called);
     if (IsColmapModel(folder)) models.push_back(folder);
@@ -138,7 +139,7 @@ std::vector<FoundModel> FindColmapModels(const std::filesystem::path& project) {
       const auto count = Exists(model / "cameras.bin") && Exists(model / "images.bin")
                              ? CountColmapImagesBinary(model / "images.bin")
                              : CountColmapImagesText(model / "images.txt");
-      here.push_back({model, count.ok() ? *count : 0});  // what is wrong is said where it is read
+      here.push_back({model, count.ok() ? *count : 0});  // errors are reported when it is read
     }
     std::ranges::stable_sort(here, std::ranges::greater(), &FoundModel::pictures);
     if (found.empty()) {
@@ -155,7 +156,7 @@ std::vector<FoundModel> FindColmapModels(const std::filesystem::path& project) {
     }
   };
   take(project / "sparse", "");
-  // Of a folder that may be anything, only those inside that are called so.
+  // In a folder of any kind, only subfolders with that name.
   const bool sparse = AbsolutePath(project / ".").parent_path().filename().string().starts_with("sparse");
   take(project, sparse ? "" : "sparse");
   for (const char* place :

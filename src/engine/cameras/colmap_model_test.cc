@@ -160,10 +160,10 @@ TEST(Colmap, LensesAreRead) {
     ASSERT_TRUE(set.ok()) << set.error().message;
     const Camera& camera = set->cameras[0];
     EXPECT_EQ(camera.photograph.lens, expected) << model;
-    const Pinhole& bent = camera.photograph.intrinsics;
-    EXPECT_EQ(bent.width, 40);
-    EXPECT_EQ(bent.cx, 21);
-    EXPECT_EQ(camera.intrinsics.fx, bent.fx) << "the pinhole keeps the focal length";
+    const Pinhole& distorted = camera.photograph.intrinsics;
+    EXPECT_EQ(distorted.width, 40);
+    EXPECT_EQ(distorted.cx, 21);
+    EXPECT_EQ(camera.intrinsics.fx, distorted.fx) << "the pinhole keeps the focal length";
   }
 }
 

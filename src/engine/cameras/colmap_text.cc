@@ -14,14 +14,14 @@ namespace anchorsplat {
 
 namespace {
 
-// images.txt lists every feature point: gigabytes are possible, but a file that long is more likely not one at all.
+// images.txt lists every feature point and can reach gigabytes, but a line this long is more likely another format.
 constexpr uint64_t kMaxTextBytes = uint64_t{4} << 30;
 
 class Lines {
  public:
   Lines(std::string name, std::string_view text) : name_(std::move(name)), rest_(text) {}
 
-  // The next line without its end; false behind the last one.
+  // The next line without its end; false at the end.
   bool Next(std::string_view& line) {
     if (rest_.empty()) return false;
     const size_t end = rest_.find('\n');
@@ -31,7 +31,7 @@ class Lines {
     return true;
   }
 
-  // The next line that says something: not empty, not a comment.
+  // The next line that is neither empty nor a comment.
   bool NextStatement(std::string_view& line) {
     while (Next(line)) {
       size_t first = 0;
@@ -62,8 +62,8 @@ Status TakeNumber(const Lines& lines, std::string_view& line, const char* what, 
   return {};
 }
 
-// A line of feature points, X Y POINT3D_ID each. They are not used, but a line that is something else means that the
-// file has lost the empty lines of images without points, and that every other image would be skipped silently.
+// Checks a line of feature points (X Y POINT3D_ID each). They are unused, but another kind of line means that the file
+// lost the empty lines of images without points, and every second image would be skipped.
 Status CheckPoints(const Lines& lines, std::string_view line) {
   size_t count = 0;
   for (std::string_view word = TakeWord(line); !word.empty(); word = TakeWord(line)) {
@@ -126,7 +126,7 @@ Result<std::vector<Camera>> ReadColmapImagesText(const std::filesystem::path& pa
       ANCHORSPLAT_RETURN_IF_ERROR(TakeNumber(lines, line, "the translation TX TY TZ", x));
     }
     ANCHORSPLAT_RETURN_IF_ERROR(TakeNumber(lines, line, "the camera's id", image.camera));
-    // The rest of the line: names may have spaces inside.
+    // The rest of the line, as names may contain spaces.
     image.name = Trimmed(line);
     auto camera = ViewFromColmap(image, cameras);
     if (!camera.ok()) return lines.Complain(camera.error().message);
@@ -134,7 +134,7 @@ Result<std::vector<Camera>> ReadColmapImagesText(const std::filesystem::path& pa
     views.push_back(*std::move(camera));
     if (lines.Next(line)) ANCHORSPLAT_RETURN_IF_ERROR(CheckPoints(lines, line));
   }
-  norms.Tell(path);
+  norms.Report(path);
   return views;
 }
 
@@ -162,7 +162,7 @@ Result<std::vector<ColmapPoint>> ReadColmapPointsText(const std::filesystem::pat
     }
     if (!AllFinite(point.position)) return lines.Complain(Cat("point ", id, " has no finite position"));
     points.push_back(point);
-    // What follows, the error and the images that see the point, is not needed.
+    // The error and the track that follow are unused.
   }
   return points;
 }

@@ -15,15 +15,15 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int32_t kPinholeModel = 1;  // COLMAP's number of PINHOLE: fx fy cx cy
+constexpr int32_t kPinholeModel = 1;  // COLMAP's id of PINHOLE: fx fy cx cy
 
-// Appends values little-endian, as every machine we build for holds them (little_endian.h).
+// Appends values in little-endian (little_endian.h).
 template <typename T>
 void Put(std::string& out, T value) {
   out.append(reinterpret_cast<const char*>(&value), sizeof value);
 }
 
-// The shortest text that reads back as the same number.
+// The shortest text that parses to the same number.
 void PutText(std::string& out, double value) {
   char text[32];
   out.append(text, std::to_chars(text, text + sizeof text, value).ptr);

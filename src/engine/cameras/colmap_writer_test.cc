@@ -70,9 +70,9 @@ TEST(ColmapWriter, PointsFollowTheFormat) {
   ASSERT_TRUE(WriteColmapPoints(folder.path(), points, ColmapForm::kBinary).ok());
   const std::string bytes = FileBytes(folder / "points3D.bin");
   ASSERT_EQ(bytes.size(), 8u + 2 * 51);
-  EXPECT_EQ(LoadLittle<uint64_t>(bytes.data()), 2u);
-  EXPECT_EQ(LoadLittle<uint64_t>(bytes.data() + 8), 1u);
-  EXPECT_EQ(LoadLittle<double>(bytes.data() + 32), 3.0);
+  EXPECT_EQ(LoadLittleEndian<uint64_t>(bytes.data()), 2u);
+  EXPECT_EQ(LoadLittleEndian<uint64_t>(bytes.data() + 8), 1u);
+  EXPECT_EQ(LoadLittleEndian<double>(bytes.data() + 32), 3.0);
   EXPECT_EQ(static_cast<uint8_t>(bytes[8 + 51 + 32]), 255);
 
   ASSERT_TRUE(WriteColmapPoints(folder.path(), points, ColmapForm::kText).ok());

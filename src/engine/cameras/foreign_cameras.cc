@@ -12,8 +12,8 @@ namespace anchorsplat {
 namespace {
 
 struct ForeignProgram {
-  std::vector<std::string_view> extensions;  // in lower case
-  std::vector<std::string_view> beginnings;  // of the file
+  std::vector<std::string_view> extensions;  // lower case
+  std::vector<std::string_view> beginnings;  // first bytes of the file
   const char* what;
   const char* instead;
 };

@@ -8,14 +8,16 @@
 
 namespace anchorsplat {
 
-// Files of cameras, and of whole projects, that other programs have and no reader here knows: "looks like …; what to
-// export instead", the end of a sentence. Empty where it is none of them.
+// Recognises camera and project files of other programs that have no reader here. Results are the end of a sentence,
+// "looks like …; what to export instead"; empty if unknown.
+//
+// By name, and by first bytes if given.
 
 // By its name, and the first bytes where they are at hand.
 std::string ForeignCameras(const std::filesystem::path& file, std::string_view head = {});
-// By what is in it.
+// By content.
 std::string ForeignJson(const JsonValue& root);
-// The first file of a folder that is one, by name: its path and the same; empty where there is none.
+// The first such file in a folder, by name: its path and the same text; empty if there is none.
 std::string ForeignCamerasIn(const std::filesystem::path& folder);
 
 }  // namespace anchorsplat

@@ -12,7 +12,7 @@ namespace anchorsplat {
 
 namespace {
 
-// `image` is the name as the file has it.
+// Camera::image is the name in the file.
 Result<Camera> ReadCamera(const JsonValue& entry) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue img_name, entry.Get("img_name"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string name, img_name.Text());

@@ -8,9 +8,9 @@
 
 namespace anchorsplat {
 
-// Cameras of an INRIA cameras.json that is already parsed: an array of {img_name, width, height, position, rotation,
-// fx, fy}, where `position` is the camera's centre and `rotation` its camera-to-world matrix in OpenCV axes. The
-// principal point is the picture's centre. Pictures are looked for in `folder` and its `images`.
+// Cameras of a parsed INRIA cameras.json: an array of {img_name, width, height, position, rotation, fx, fy}, with the
+// camera centre as `position` and the camera-to-world matrix in OpenCV axes as `rotation`. The principal point is the
+// image centre. Images are searched in `folder` and its `images`.
 Result<CameraSet> CamerasFromInria(const JsonValue& root, const std::filesystem::path& folder);
 
 }  // namespace anchorsplat

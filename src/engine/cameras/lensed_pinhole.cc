@@ -8,15 +8,15 @@
 
 namespace anchorsplat {
 
-Result<LensedPinhole> ThroughLens(const Lens& lens, const Pinhole& bent) {
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckIntrinsics(bent));
-  if (lens.IsStraight()) return LensedPinhole{bent, {}};
+Result<LensedPinhole> ThroughLens(const Lens& lens, const Pinhole& distorted) {
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckIntrinsics(distorted));
+  if (lens.IsIdentity()) return LensedPinhole{distorted, {}};
   if (!AllFinite(lens.radial) || !AllFinite(lens.denominator) || !AllFinite(lens.tangential) ||
       !std::isfinite(lens.skew)) {
     return Error{ErrorCode::kBadFile, "lens distortion is not finite"};
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Pinhole straight, StraightPinhole(lens, bent));
-  return LensedPinhole{straight, {.lens = lens, .intrinsics = bent, .mask = {}}};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Pinhole undistorted, UndistortedPinhole(lens, distorted));
+  return LensedPinhole{undistorted, {.lens = lens, .intrinsics = distorted, .mask = {}}};
 }
 
 }  // namespace anchorsplat

@@ -5,14 +5,15 @@
 
 namespace anchorsplat {
 
-// Intrinsics that views share: the pinhole that their pictures are undone to, and how the pictures come.
+// Intrinsics shared by views: of the undistorted view, and of the images as stored.
 struct LensedPinhole {
-  Pinhole straight;
+  Pinhole undistorted;
   Photograph photograph;
 };
 
-// Of pictures taken through `lens`, `bent` being their intrinsics; without a lens where it is straight. Errors
-// (kBadFile, the end of a sentence): those of CheckIntrinsics and StraightPinhole; a coefficient that is not finite.
-Result<LensedPinhole> ThroughLens(const Lens& lens, const Pinhole& bent);
+// Intrinsics for images taken through `lens` with intrinsics `distorted`; the lens is dropped if it distorts nothing.
+// Errors (kBadFile, the end of a sentence): those of CheckIntrinsics and UndistortedPinhole; a coefficient that is not
+// finite.
+Result<LensedPinhole> ThroughLens(const Lens& lens, const Pinhole& distorted);
 
 }  // namespace anchorsplat

@@ -22,11 +22,11 @@ namespace anchorsplat {
 namespace {
 
 constexpr size_t kMostXmlBytes = size_t{256} << 20;
-// "<" and "=", of which a parsed tree has no more elements and attributes: a bound on its memory.
+// Limit on "<" and "=" characters, which bounds elements and attributes of the parsed tree and thus its memory.
 constexpr int64_t kMostMarks = int64_t{1} << 23;
 constexpr int kDeepestGroup = 64;
 
-// Whose complaints name the file and the line.
+// XML access with errors that name file and line.
 class XmlText {
  public:
   XmlText(const std::string& name, std::string_view bytes) : name_(name), bytes_(bytes) {}
@@ -48,7 +48,7 @@ class XmlText {
 
 bool IsXmlSpace(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
 
-// The numbers that an element's text consists of.
+// The numbers in an element's text.
 Result<std::vector<double>> NumbersOf(const XmlText& xml, const pugi::xml_node& node, size_t count) {
   std::string_view text = node.child_value();
   std::vector<double> numbers;
@@ -74,7 +74,7 @@ Result<std::vector<double>> NumbersOf(const XmlText& xml, const pugi::xml_node& 
   return numbers;
 }
 
-// Of a child element; `missing` where there is none.
+// Number in a child element; `missing` if absent.
 Result<double> NumberOf(const XmlText& xml, const pugi::xml_node& parent, const char* child, double missing) {
   const pugi::xml_node node = parent.child(child);
   if (!node) return missing;
@@ -82,7 +82,7 @@ Result<double> NumberOf(const XmlText& xml, const pugi::xml_node& parent, const 
   return numbers[0];
 }
 
-// The nearest rotation to nine numbers that are one up to rounding.
+// Nearest rotation to nine numbers of a rounded one.
 Result<std::array<double, 9>> RotationOf(const XmlText& xml, const pugi::xml_node& node,
                                          const std::array<double, 9>& numbers) {
   const auto pose = PoseFromCameraToWorld(numbers, {0, 0, 0});
@@ -90,7 +90,7 @@ Result<std::array<double, 9>> RotationOf(const XmlText& xml, const pugi::xml_nod
   return NearestRotation(numbers);
 }
 
-// <rotation>, <translation> and <scale> of a component or chunk; nothing where it has no <transform>.
+// <rotation>, <translation> and <scale> of a component or chunk; none without <transform>.
 Result<std::optional<Similarity>> TransformOf(const XmlText& xml, const pugi::xml_node& owner) {
   const pugi::xml_node transform = owner.child("transform");
   if (!transform || !transform.first_child()) return std::optional<Similarity>();
@@ -123,7 +123,7 @@ Result<int> SideOf(const XmlText& xml, const pugi::xml_node& resolution, const c
   return side;
 }
 
-// The adjusted calibration, else the first.
+// The adjusted calibration, else the first one.
 pugi::xml_node CalibrationOf(const pugi::xml_node& sensor) {
   pugi::xml_node chosen = sensor.child("calibration");
   for (const pugi::xml_node calibration : sensor.children("calibration")) {
@@ -181,7 +181,7 @@ Result<LensedPinhole> SensorOf(const XmlText& xml, const pugi::xml_node& sensor)
   return through;
 }
 
-// The camera elements of a chunk, those in groups as well.
+// Camera elements of a chunk, including those in groups.
 Status CollectCameras(const XmlText& xml, const pugi::xml_node& parent, int depth, std::vector<pugi::xml_node>& out) {
   if (depth > kDeepestGroup) return xml.Complain(parent, Cat("groups are nested deeper than ", kDeepestGroup));
   for (const pugi::xml_node child : parent.children()) {
@@ -221,7 +221,7 @@ std::string Named(const char* kind, const std::string& label) {
   return label.empty() ? Cat("a ", kind, " without a label") : Cat(kind, " \"", Printable(label), "\"");
 }
 
-// Components that no transform places are worlds of their own: of those only the largest is kept.
+// Components without a transform have separate worlds: only the largest is kept.
 void KeepOneWorld(const XmlText& xml, const std::map<std::string, Similarity>& placed, MetashapeChunk& chunk) {
   std::map<std::string, size_t> cameras_of;
   for (const pugi::xml_node& camera : chunk.aligned) ++cameras_of[camera.attribute("component_id").value()];
@@ -251,7 +251,7 @@ Result<Pose> PoseOf(const XmlText& xml, const pugi::xml_node& camera, const Simi
   return world;
 }
 
-// How many, and what became of the others.
+// Counts of the other cameras, for a message.
 void SayWhatIsLeftOut(const XmlText& xml, const std::vector<MetashapeChunk>& chunks, const MetashapeChunk& taken) {
   if (taken.not_aligned > 0) {
     LogWarning(Cat(xml.name(), ": ", taken.not_aligned, " of ",
@@ -270,7 +270,7 @@ void SayWhatIsLeftOut(const XmlText& xml, const std::vector<MetashapeChunk>& chu
 Result<CameraSet> CamerasOfChunk(const XmlText& xml, const std::vector<MetashapeChunk>& chunks, MetashapeChunk chunk,
                                  const std::filesystem::path& folder) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<Similarity> of_chunk, TransformOf(xml, chunk.node));
-  std::map<std::string, Similarity> placed;  // components by their id
+  std::map<std::string, Similarity> placed;  // transforms of components, by id
   for (const pugi::xml_node component : chunk.node.child("components").children("component")) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<Similarity> transform, TransformOf(xml, component));
     if (transform) placed[component.attribute("id").value()] = *transform;
@@ -298,7 +298,7 @@ Result<CameraSet> CamerasOfChunk(const XmlText& xml, const std::vector<Metashape
     const auto component = placed.find(node.attribute("component_id").value());
     const Similarity world = component != placed.end() ? component->second : of_chunk.value_or(Similarity());
     ANCHORSPLAT_ASSIGN_OR_RETURN(Pose pose, PoseOf(xml, node, world));
-    set.cameras.push_back({ViewName(label), label, lensed.straight, std::move(pose), lensed.photograph});
+    set.cameras.push_back({ViewName(label), label, lensed.undistorted, std::move(pose), lensed.photograph});
   }
   FindPicturesOf({.folders = FoldersOfPictures(folder), .project = folder}, set.cameras);
   return set;
@@ -318,7 +318,7 @@ Result<CameraSet> CamerasFromMetashape(const std::string& name, std::string_view
   if (std::ranges::count_if(bytes, [](char c) { return c == '<' || c == '='; }) > kMostMarks) {
     return xml.Complain(-1, Cat("has more than ", WithThousands(kMostMarks), " elements and attributes"));
   }
-  // Without what a DTD declares: entities of a file's own are not known to this parser.
+  // Without a DTD: the parser does not support custom entities.
   pugi::xml_document document;
   const pugi::xml_parse_result parsed =
       document.load_buffer(bytes.data(), bytes.size(), pugi::parse_minimal | pugi::parse_escapes | pugi::parse_eol);

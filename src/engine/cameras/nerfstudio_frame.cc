@@ -20,7 +20,7 @@ namespace {
 
 constexpr uint64_t kMostConfigBytes = uint64_t{4} << 20;
 
-// Rows of a rotation and a translation, three or four of them.
+// Three or four rows of a rotation and a translation.
 Result<Similarity> RigidRows(const JsonValue& matrix) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> rows, matrix.Elements());
   if (rows.size() != 3 && rows.size() != 4) return matrix.Complain(Cat("expected 3 rows, found ", rows.size()));
@@ -42,8 +42,8 @@ Result<double> PositiveScale(const JsonValue& value) {
   return scale;
 }
 
-// A path that a config.yml has as Python's pathlib is written in YAML, "data: !!python/object/apply:pathlib.PosixPath"
-// and a line with "- PART" for each part; the first that has some. Empty without one.
+// The first path in a config.yml, in the YAML of Python's pathlib: "data: !!python/object/apply:pathlib.PosixPath" and
+// a line "- PART" per part. Empty if there is none.
 std::filesystem::path DataOfConfig(std::string_view yaml) {
   std::filesystem::path data;
   bool within = false;
@@ -73,7 +73,7 @@ Result<Similarity> ReadNerfstudioFrame(const std::filesystem::path& file) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(Similarity frame, RigidRows(transform));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue scale, json.root().Get("scale"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(frame.scale, PositiveScale(scale));
-  for (double& x : frame.translation) x *= frame.scale;  // nerfstudio scales what it has moved
+  for (double& x : frame.translation) x *= frame.scale;  // nerfstudio scales after moving
   return frame;
 }
 
@@ -89,7 +89,7 @@ Result<Similarity> AppliedByNerfstudio(const JsonValue& transforms, const std::f
 
 Status MoveToNerfstudioFrame(const std::filesystem::path& file, const Similarity& applied, CameraSet& set) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Similarity frame, ReadNerfstudioFrame(file));
-  set.moved = After(frame, Inverse(applied));
+  set.moved = Compose(frame, Inverse(applied));
   for (Camera& camera : set.cameras) {
     camera.world_to_camera = Moved(camera.world_to_camera, *set.moved);
     for (const double x : camera.world_to_camera.translation) {

@@ -19,14 +19,14 @@ namespace anchorsplat {
 
 namespace {
 
-// A coefficient; 0 where it is not there.
+// A coefficient; 0 if absent.
 Result<double> Coefficient(const JsonValue& camera, const char* name) {
   const auto value = camera.Find(name);
   if (!value || value->raw().is_null()) return 0.0;
   return value->Number();
 }
 
-// OpenSfM's opensfm/io.py and geometry/camera_projections_functions.h: the radial models are OpenCV's of fewer
+// OpenSfM's opensfm/io.py and geometry/camera_projections_functions.h: radial models are OpenCV's with fewer
 // coefficients, "fisheye" is OpenCV's with two.
 Result<LensedPinhole> ShotCamera(const JsonValue& camera) {
   std::string type = "perspective";
@@ -106,7 +106,7 @@ void SayOfOthers(const std::vector<JsonValue>& all, size_t taken) {
                  .message);
 }
 
-// Where the world's middle is on Earth.
+// Location of the world's origin on Earth.
 void SayOfReference(const JsonValue& reconstruction) {
   const auto reference = reconstruction.Find("reference_lla");
   if (!reference) return;
@@ -150,7 +150,7 @@ Result<CameraSet> CamerasFromOpenSfm(const JsonValue& root, const std::filesyste
     }
     const LensedPinhole& lensed = known[camera_name];
     ANCHORSPLAT_ASSIGN_OR_RETURN(Pose pose, ShotPose(shot));
-    set.cameras.push_back({ViewName(name), name, lensed.straight, std::move(pose), lensed.photograph});
+    set.cameras.push_back({ViewName(name), name, lensed.undistorted, std::move(pose), lensed.photograph});
   }
   FindPicturesOf({.folders = FoldersOfPictures(folder), .project = folder}, set.cameras);
   return set;

@@ -11,14 +11,14 @@ namespace anchorsplat {
 // Whether it is a reconstruction.json: a list of objects with "shots".
 bool IsOpenSfm(const JsonValue& root);
 
-// Cameras of an OpenSfM reconstruction.json, as OpenDroneMap has it in its folder `opensfm`: shots sorted by name,
-// which is their picture's; pictures are looked for in `images` of `folder`, in `folder` and in `images` beside it.
-// Rotations are axis times angle, world to camera; focal lengths and principal points are in the longer side, the
-// latter from the picture's middle. The world is the file's own, metres from `reference_lla` where it has one, which is
-// only said. Of several reconstructions the one with the most shots is taken; a message says what the others have.
+// Reads cameras of an OpenSfM reconstruction.json (in OpenDroneMap's folder `opensfm`): shots sorted by name, which is
+// the image name; images are searched in `images` of `folder`, in `folder` and in `images` beside it. Rotations are
+// axis times angle, world to camera. Focal lengths and principal points are in units of the longer side, the latter
+// from the image centre. The world is the file's own, in metres from `reference_lla`, if given, which is only reported.
+// Of several reconstructions the one with the most shots is taken; a message describes the others.
 //
 // Lenses: perspective, simple_radial, radial, brown, fisheye, fisheye_opencv. Errors (kBadFile with the JSON path):
-// other ones by name; a camera without width and height; what is missing or no number.
+// another lens, by name; a camera without width and height; a missing or invalid value.
 Result<CameraSet> CamerasFromOpenSfm(const JsonValue& root, const std::filesystem::path& folder);
 
 }  // namespace anchorsplat

@@ -12,12 +12,12 @@ namespace anchorsplat {
 
 namespace {
 
-// Of the picture in the file, upright, behind the lens.
-const Pinhole& Bent(const Camera& camera) {
+// Intrinsics of the image file, upright, before undistortion.
+const Pinhole& IntrinsicsOfFile(const Camera& camera) {
   return camera.photograph.intrinsics.width > 0 ? camera.photograph.intrinsics : camera.intrinsics;
 }
 
-// Whether a picture of that size is a scaled one of the other: one side agrees to a pixel when the other does exactly.
+// Whether one size is a rescaled other: one side may be off by a pixel if the other matches exactly.
 bool SameShape(int width, int height, int other_width, int other_height) {
   const double x = static_cast<double>(width) / other_width, y = static_cast<double>(height) / other_height;
   return std::abs(other_width * y - width) < 1 || std::abs(other_height * x - height) < 1;
@@ -27,10 +27,10 @@ Error BadPicture(const std::filesystem::path& file, const std::string& sentence)
   return Error{ErrorCode::kBadFile, Cat(file.string(), ": ", sentence)};
 }
 
-// 1 where the mask is black, of a picture of width × height pixels upright, whose file is turned by `orientation`.
+// 1 where the mask is black, for an image of width × height pixels upright, stored with `orientation`.
 Result<Buffer<uint8_t>> ReadIgnored(const std::filesystem::path& file, int width, int height, int orientation) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(Image mask, ReadImage(file));
-  // A mask that was drawn over the stored picture lies as that does.
+  // A mask of the stored image's size is rotated with it.
   const bool stored = SwapsSides(orientation) ? SameShape(mask.height, mask.width, width, height) : orientation > 1;
   if (stored && !(SwapsSides(orientation) && SameShape(mask.width, mask.height, width, height))) {
     mask = Upright(std::move(mask), orientation);
@@ -61,28 +61,29 @@ Result<Buffer<uint8_t>> ReadIgnored(const std::filesystem::path& file, int width
 
 Status MatchPhotograph(Camera& camera, int downscale) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(ImageSize size, ReadImageSize(camera.image));
-  Pinhole bent = Bent(camera);
+  Pinhole distorted = IntrinsicsOfFile(camera);
   Photograph& photograph = camera.photograph;
-  if (!SameShape(size.width, size.height, bent.width, bent.height)) {
-    if (!SwapsSides(size.orientation) || !SameShape(size.height, size.width, bent.width, bent.height)) {
+  if (!SameShape(size.width, size.height, distorted.width, distorted.height)) {
+    if (!SwapsSides(size.orientation) || !SameShape(size.height, size.width, distorted.width, distorted.height)) {
       return BadPicture(camera.image, Cat("the picture has ", size.width, "x", size.height, " pixels, its camera ",
-                                          bent.width, "x", bent.height, ", which is another shape"));
+                                          distorted.width, "x", distorted.height, ", which is another shape"));
     }
     photograph.orientation = size.orientation;
     std::swap(size.width, size.height);
   }
-  if (size.width != bent.width || size.height != bent.height) {
-    const double x = static_cast<double>(size.width) / bent.width, y = static_cast<double>(size.height) / bent.height;
-    bent = {size.width, size.height, bent.fx * x, bent.fy * y, bent.cx * x, bent.cy * y};
+  if (size.width != distorted.width || size.height != distorted.height) {
+    const double x = static_cast<double>(size.width) / distorted.width,
+                 y = static_cast<double>(size.height) / distorted.height;
+    distorted = {size.width, size.height, distorted.fx * x, distorted.fy * y, distorted.cx * x, distorted.cy * y};
   }
-  auto straight = StraightPinhole(photograph.lens, bent);
-  if (!straight.ok()) return BadPicture(camera.image, straight.error().message);
-  photograph.intrinsics = photograph.lens.IsStraight() && downscale == 1 ? Pinhole{} : bent;
+  auto undistorted = UndistortedPinhole(photograph.lens, distorted);
+  if (!undistorted.ok()) return BadPicture(camera.image, undistorted.error().message);
+  photograph.intrinsics = photograph.lens.IsIdentity() && downscale == 1 ? Pinhole{} : distorted;
   photograph.downscale = downscale;
-  camera.intrinsics = downscale > 1 ? Downscaled(*straight, downscale) : *straight;
+  camera.intrinsics = downscale > 1 ? Downscaled(*undistorted, downscale) : *undistorted;
   if (camera.intrinsics.width < 1 || camera.intrinsics.height < 1) {
-    return BadPicture(camera.image, Cat("nothing is left of ", straight->width, "x", straight->height, " pixels at 1/",
-                                        downscale, " of them per side"));
+    return BadPicture(camera.image, Cat("nothing is left of ", undistorted->width, "x", undistorted->height,
+                                        " pixels at 1/", downscale, " of them per side"));
   }
   return {};
 }
@@ -91,17 +92,18 @@ Result<ViewPicture> ReadPhotograph(const Camera& camera) {
   const Photograph& photograph = camera.photograph;
   ANCHORSPLAT_ASSIGN_OR_RETURN(Image image, ReadImage(camera.image));
   ViewPicture picture{Upright(std::move(image), photograph.orientation), {}};
-  const Pinhole& bent = Bent(camera);
+  const Pinhole& distorted = IntrinsicsOfFile(camera);
   const int width = picture.image.width, height = picture.image.height;
-  if (width != bent.width || height != bent.height) {
-    return BadPicture(camera.image, Cat(width, "x", height, " pixels, expected ", bent.width, "x", bent.height));
+  if (width != distorted.width || height != distorted.height) {
+    return BadPicture(camera.image,
+                      Cat(width, "x", height, " pixels, expected ", distorted.width, "x", distorted.height));
   }
   if (!photograph.mask.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(picture.ignored, ReadIgnored(photograph.mask, width, height, photograph.orientation));
   }
-  if (!photograph.lens.IsStraight()) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const Pinhole straight, StraightPinhole(photograph.lens, bent));
-    picture = Undistort(picture, photograph.lens, bent, straight);
+  if (!photograph.lens.IsIdentity()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Pinhole undistorted, UndistortedPinhole(photograph.lens, distorted));
+    picture = Undistort(picture, photograph.lens, distorted, undistorted);
   }
   if (photograph.downscale > 1) picture = Downscaled(picture, photograph.downscale);
   return picture;

@@ -6,22 +6,23 @@
 
 namespace anchorsplat {
 
-// Fits a camera whose file is known to the picture in it, and asks for a `downscale`-th of its pixels per side:
+// Adapts a camera to its image file, at 1/`downscale` of the resolution:
 //
-// * A picture of another size than the camera file says is a scaled one when its shape agrees.
-// * One that agrees only when it is turned as its EXIF orientation says will be turned. One that agrees as it is stored
-//   is taken so, whatever its EXIF says: camera files mostly count stored pixels, and where width and height say
-//   nothing (a half turn, a mirror, a square) there is nothing better to go by.
+// * An image of another size but the same aspect ratio is a rescaled one.
+// * An image that fits only after its EXIF rotation will be rotated. One that fits as stored is taken as stored,
+// whatever
+//   its EXIF says: camera files mostly refer to stored pixels, and if width and height cannot tell (a half turn, a
+//   mirror, a square) there is no better evidence.
 //
-// Sets `intrinsics` to those of the picture that ReadPhotograph gives. Call it once. Errors: those of ReadImageSize;
-// kBadFile: another shape, a picture that is smaller than `downscale`; as StraightPinhole.
+// Sets `intrinsics` to those of ReadPhotograph's result. Call it once per camera. Errors: those of ReadImageSize and
+// UndistortedPinhole; kBadFile: another aspect ratio, an image smaller than `downscale`.
 Status MatchPhotograph(Camera& camera, int downscale = 1);
 
-inline constexpr int kMostDownscale = 64;
+inline constexpr int kMaxDownscale = 64;
 
-// The view's picture: decoded, turned, masked, without the lens, averaged down. Its size is that of `intrinsics`.
-// Errors: those of ReadImage; kBadFile: the picture has not its camera's size, or the mask neither the picture's size
-// nor its shape.
+// The picture of a view: decoded, rotated, masked, undistorted, downscaled to the size of `intrinsics`. Errors: those
+// of ReadImage; kBadFile: the image does not have its camera's size, or the mask neither the image's size nor its
+// aspect ratio.
 Result<ViewPicture> ReadPhotograph(const Camera& camera);
 
 }  // namespace anchorsplat

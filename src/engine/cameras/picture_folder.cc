@@ -4,9 +4,9 @@
 #include <system_error>
 #include <utility>
 
+#include "core/ascii_lower_case.h"
 #include "core/decomposed.h"
 #include "core/file_system.h"
-#include "core/small_letters.h"
 #include "core/text.h"
 #include "images/picture_names.h"
 
@@ -16,17 +16,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// How near the kind of picture `name` has is to the one that `wanted` says; less is nearer.
+// How well the image type of `name` matches that of `wanted`; less is better.
 int Farness(const fs::path& wanted, const fs::path& name) {
   const auto kind = [](const fs::path& path) {
-    const std::string extension = SmallLetters(path.extension().string());
+    const std::string extension = AsciiLowerCase(path.extension().string());
     return extension == ".jpeg" ? ".jpg" : extension == ".tiff" ? ".tif" : extension;
   };
-  if (!HasPictureExtension(name)) return 3;  // named, so that reading it says what to do
+  if (!HasPictureExtension(name)) return 3;  // found, so that reading it reports the type
   return kind(name) == (HasAnyPictureExtension(wanted) ? kind(wanted) : ".png") ? 1 : 2;
 }
 
-// Whether its name says that it goes with a photograph and is none: r_0_depth_0001.png of NeRF-synthetic.
+// Whether a name marks data that accompanies a photograph, such as r_0_depth_0001.png of NeRF-synthetic.
 bool GoesWithAnother(const std::string& name) {
   const std::string stem = PictureStem(name);
   for (const char* kind : {"_depth", "_normal", "_mask", "_seg", "_alpha"}) {
@@ -37,7 +37,7 @@ bool GoesWithAnother(const std::string& name) {
 
 }  // namespace
 
-std::string NameKey(const std::string& name) { return SmallLetters(Decomposed(name)); }
+std::string NameKey(const std::string& name) { return AsciiLowerCase(Decomposed(name)); }
 
 std::string PictureStem(const std::string& name) {
   const fs::path path(name);
@@ -70,7 +70,7 @@ Result<std::string> PictureFolder::Find(const std::string& name) const {
   }
   const auto found = by_stem_.find(PictureStem(name));
   if (found == by_stem_.end()) return std::string();
-  // The same letters are nearer than the same kind.
+  // Equal letter case counts more than equal image type.
   const std::string stem = HasAnyPictureExtension(name) ? fs::path(name).stem().string() : name;
   const auto farness = [&](const std::string& other) {
     return std::pair(fs::path(other).stem() != stem, Farness(name, other));

@@ -11,9 +11,9 @@
 
 #include "cameras/camera_checks.h"
 #include "cameras/picture_folder.h"
+#include "core/ascii_lower_case.h"
 #include "core/file_system.h"
 #include "core/log.h"
-#include "core/small_letters.h"
 #include "core/text.h"
 #include "images/rendering.h"
 #include "io/input_record.h"
@@ -25,17 +25,17 @@ namespace {
 namespace fs = std::filesystem;
 using Parts = std::vector<std::string>;
 
-// A project has its pictures a few folders deep; who names a home folder is not to wait for all of it.
+// Limits of the search: images are a few folders deep, and a home folder must not take forever.
 constexpr int kDeepest = 5;
 constexpr size_t kMostEntries = 200'000;
-constexpr int kUsualRank = 20;  // of folders where everybody looks (RankOf)
+constexpr int kUsualRank = 20;  // rank of the usual folders (RankOf)
 
 bool IsAbsoluteSomewhere(const std::string& path) {
   return path.starts_with('/') ||
          (path.size() > 1 && path[1] == ':' && std::isalpha(static_cast<unsigned char>(path[0])) != 0);
 }
 
-// With '/', and without what says that it is an address or a drive.
+// Converts to '/' and removes URL scheme and drive.
 std::string WithSlashes(std::string path) {
   std::ranges::replace(path, '\\', '/');
   if (path.starts_with("file://")) path.erase(0, 7);
@@ -61,9 +61,9 @@ std::string PercentDecoded(const std::string& text) {
   return decoded;
 }
 
-thread_local UnclearPictures* open_unclear = nullptr;
+thread_local AmbiguousPictures* open_ambiguous = nullptr;
 
-// A path as the file has it, taken apart.
+// A path of the file, split.
 struct Named {
   explicit Named(const std::string& text) : path(WithSlashes(text)), absolute(IsAbsoluteSomewhere(path)) {
     const size_t slash = path.rfind('/');
@@ -85,7 +85,7 @@ struct Named {
   Parts parts;  // of the folder
 };
 
-// How many names the ends of two paths have in common, in any letters.
+// Number of path components in the common suffix, ignoring case.
 size_t CommonEnd(const Parts& a, const Parts& b) {
   size_t n = 0;
   while (n < a.size() && n < b.size() && NameKey(a[a.size() - 1 - n]) == NameKey(b[b.size() - 1 - n])) ++n;
@@ -100,7 +100,8 @@ Parts PartsOf(const fs::path& folder) {
   return parts;
 }
 
-// masks, depth_maps, normal-8, what programs render (ours_30000/renders beside gt): by its first word.
+// Whether the first word of a folder name means no photographs: masks, depth_maps, normal-8, renders
+// (ours_30000/renders beside gt).
 bool IsOfOtherThings(const std::string& name) {
   std::string word =
       name.substr(0, std::ranges::find_if_not(name, [](unsigned char c) { return std::isalpha(c); }) - name.begin());
@@ -113,15 +114,14 @@ bool IsOfOtherThings(const std::string& name) {
   return false;
 }
 
-// How likely photographs are in a folder of the project by what it and those above it are called; less is likelier.
-// Nothing: they are something else.
+// Rank of a folder for photographs by its name and those above it; less is likelier, none: not photographs.
 std::optional<int> RankOf(const Parts& below, const PicturePlaces& places) {
-  if (below.empty()) return 30;  // the project's own
+  if (below.empty()) return 30;  // the project folder
   int best = 50;
   for (const std::string& part : below) {
-    const std::string name = SmallLetters(part);
+    const std::string name = AsciiLowerCase(part);
     if (!places.masks && IsOfOtherThings(name)) return std::nullopt;
-    // images_4 of nerfstudio and of 3DGS: averaged down by that.
+    // images_4 of nerfstudio and 3DGS: downscaled by 4.
     const size_t bar = name.rfind('_');
     const bool reduced = bar != std::string::npos && bar + 1 < name.size() && name.size() < bar + 5 &&
                          std::all_of(name.begin() + static_cast<ptrdiff_t>(bar) + 1, name.end(),
@@ -162,8 +162,7 @@ class Search {
     if (places_.complete) TellOfOthers();
     for (size_t i = 0; i < raw_.size(); ++i) {
       if (!found_[i].file.empty()) {
-        // The pictures are a part of what the cameras are read from, whoever opens them; what was rendered through the
-        // cameras may be rendered again.
+        // Images count as inputs, whoever opens them; our renderings may be rendered again.
         if (!IsOwnRendering(found_[i].file)) RecordInput(found_[i].file);
       } else {
         const fs::path& first = places_.folders.empty() ? places_.project : places_.folders[0];
@@ -175,7 +174,7 @@ class Search {
   }
 
  private:
-  // A name that has '\' or '%' here, too.
+  // Names may contain '\' or '%' themselves.
   void TakeLiterally(size_t i) {
     if (raw_[i].find_first_of("\\%") == std::string::npos) return;
     for (const fs::path& base : places_.folders) {
@@ -206,9 +205,9 @@ class Search {
     return known != folders_.end() ? known->second : folders_.emplace(path, PictureFolder(path)).first->second;
   }
 
-  bool IsOpen(size_t i) const { return found_[i].file.empty() && found_[i].unclear.empty(); }
+  bool IsOpen(size_t i) const { return found_[i].file.empty() && found_[i].ambiguity.empty(); }
 
-  // What is not found yet, by the folder that the file says.
+  // Missing images, grouped by the folder in the file.
   std::map<std::string, std::vector<size_t>> Groups() const {
     std::map<std::string, std::vector<size_t>> groups;
     for (size_t i = 0; i < named_.size(); ++i) {
@@ -220,7 +219,7 @@ class Search {
   void SearchFolders() {
     for (const auto& [folder, group] : Groups()) {
       for (const fs::path& base : places_.folders) {
-        // "images/" of a project is its folder "images", whatever it is reached by.
+        // "images/" of a project is its folder "images", however it is reached.
         fs::path place = (base / folder).lexically_normal();
         if (!place.has_filename() && place.has_parent_path() && place != place.root_path()) place = place.parent_path();
         if (TakeFrom(Folder(place), group, named_[group[0]].parts.size()) > 0) settled_.insert(folder);
@@ -229,7 +228,7 @@ class Search {
     }
   }
 
-  // How many of the group are in this folder; those that are not found yet are taken.
+  // Number of the group's images in this folder; takes those not yet found.
   size_t TakeFrom(const PictureFolder& folder, const std::vector<size_t>& group, size_t levels) {
     size_t count = 0;
     if (folder.empty()) return count;
@@ -241,13 +240,13 @@ class Search {
       if (file.ok()) {
         Take(i, folder.path(), *file, levels);
       } else {
-        found_[i].unclear = file.error().message;
+        found_[i].ambiguity = file.error().message;
       }
     }
     return count;
   }
 
-  // Whether what the group means in a folder was rendered by us: by the first of its pictures there.
+  // Whether the group's first image in a folder is our rendering.
   bool IsRendered(const PictureFolder& folder, const std::vector<size_t>& group) const {
     for (const size_t i : group) {
       const Result<std::string> file = folder.Find(named_[i].file);
@@ -264,16 +263,16 @@ class Search {
       const auto has = by_stem_.find(PictureStem(named_[i].file));
       if (has != by_stem_.end()) candidates.insert(has->second.begin(), has->second.end());
     }
-    // By the end of the path, then by what the folder is called; a set of pointers has no order of its own.
+    // Sorted by path suffix, then folder name, as a set of pointers has no stable order.
     std::vector<std::tuple<ptrdiff_t, int, fs::path, const PictureFolder*>> ranked;
     for (const PictureFolder* folder : candidates) {
       const Parts all = PartsOf(AbsolutePath(folder->path()));
       const size_t common = CommonEnd(all, named_[group[0]].parts);
       const size_t own = std::min(project.size(), all.size());
       Parts below(all.begin() + static_cast<ptrdiff_t>(own), all.end());
-      below.resize(below.size() - std::min(common, below.size()));  // what the file itself says is right
+      below.resize(below.size() - std::min(common, below.size()));  // the part given by the file is right
       const auto rank = common > 0 && below.empty() ? std::optional(0) : RankOf(below, places_);
-      // Renderings may be what is trained on where everybody has pictures; elsewhere they are somebody's results.
+      // Renderings in the usual folders may be training images; elsewhere they are results.
       if (rank > kUsualRank && IsRendered(*folder, group)) continue;
       if (rank) ranked.emplace_back(-static_cast<ptrdiff_t>(common), *rank, folder->path(), folder);
     }
@@ -281,10 +280,10 @@ class Search {
     std::ranges::sort(ranked);
     if (ranked.size() > 1 && std::get<0>(ranked[0]) == std::get<0>(ranked[1]) &&
         std::get<1>(ranked[0]) == std::get<1>(ranked[1])) {
-      const std::string unclear = Cat("the picture \"", Printable(raw_[group[0]]), "\" and those with it may be in ",
-                                      std::get<2>(ranked[0]).string(), " or in ", std::get<2>(ranked[1]).string(),
-                                      "; move one of these folders away");
-      for (const size_t i : group) found_[i].unclear = unclear;
+      const std::string ambiguity = Cat("the picture \"", Printable(raw_[group[0]]), "\" and those with it may be in ",
+                                        std::get<2>(ranked[0]).string(), " or in ", std::get<2>(ranked[1]).string(),
+                                        "; move one of these folders away");
+      for (const size_t i : group) found_[i].ambiguity = ambiguity;
       return;
     }
     const auto& [common, rank, path, folder] = ranked[0];
@@ -295,11 +294,11 @@ class Search {
     TakeFrom(*folder, group, static_cast<size_t>(-common));
   }
 
-  // All folders with pictures below the project, once. None where there are too many to look through.
+  // All folders with images below the project, listed once; none if there are too many.
   void ListProject() {
     if (listed_) return;
     listed_ = true;
-    std::set<fs::path> seen;  // links may lead in circles
+    std::set<fs::path> seen;  // links may form cycles
     size_t entries = 0;
     List(places_.project, kDeepest, seen, entries);
     if (entries > kMostEntries) below_.clear();
@@ -325,7 +324,7 @@ class Search {
     }
   }
 
-  // Another machine's folders are no part of a view's name.
+  // View names exclude another machine's folders.
   void NameViews() {
     std::optional<Parts> common;
     for (const Named& named : named_) {
@@ -355,7 +354,7 @@ class Search {
     const fs::path where = used_.size() == 1 ? used_.begin()->first : places_.project;
     const std::string text =
         Cat(where.string(), ": ", others, " of ", all, " pictures have no camera and are not used");
-    // A reconstruction leaves some out; most of them it should not.
+    // A reconstruction may omit some images, but not most.
     if (2 * others >= all) {
       LogWarning(text);
     } else {
@@ -367,8 +366,8 @@ class Search {
   std::vector<std::string> raw_;
   std::vector<Named> named_;
   std::vector<FoundPicture> found_;
-  std::vector<bool> open_;         // what a search is for
-  std::set<std::string> settled_;  // folders of the file that are known here: what they lack is missing
+  std::vector<bool> open_;         // images still to be found
+  std::set<std::string> settled_;  // folders of the file that have been resolved: other names in them are missing
   std::map<fs::path, PictureFolder> folders_;
   std::map<fs::path, std::set<std::string>> used_;
   bool listed_ = false, told_ = false;
@@ -381,7 +380,7 @@ class Search {
 std::vector<FoundPicture> FindPictures(const PicturePlaces& places, std::span<const std::string> names) {
   std::vector<FoundPicture> found = Search(places, names).Run();
   for (const FoundPicture& picture : found) {
-    if (open_unclear != nullptr && open_unclear->first_.empty()) open_unclear->first_ = picture.unclear;
+    if (open_ambiguous != nullptr && open_ambiguous->first_.empty()) open_ambiguous->first_ = picture.ambiguity;
   }
   return found;
 }
@@ -397,9 +396,9 @@ void FindPicturesOf(const PicturePlaces& places, std::span<Camera> cameras) {
   }
 }
 
-UnclearPictures::UnclearPictures() : outer_(open_unclear) { open_unclear = this; }
+AmbiguousPictures::AmbiguousPictures() : outer_(open_ambiguous) { open_ambiguous = this; }
 
-UnclearPictures::~UnclearPictures() { open_unclear = outer_; }
+AmbiguousPictures::~AmbiguousPictures() { open_ambiguous = outer_; }
 
 fs::path ProjectAbove(const fs::path& folder) {
   constexpr int kHighest = 4;
@@ -407,7 +406,7 @@ fs::path ProjectAbove(const fs::path& folder) {
   fs::path full = AbsolutePath(place);
   if (!full.has_filename()) full = full.parent_path();
   for (int level = 0; level < kHighest; ++level) {
-    const std::string name = SmallLetters(full.filename().string());
+    const std::string name = AsciiLowerCase(full.filename().string());
     bool inner = !name.empty() && std::ranges::all_of(name, [](unsigned char c) { return std::isdigit(c) != 0; });
     for (const char* usual : {"sparse", "colmap", "distorted", "undistorted", "dense", "text", "txt", "bin", "model"}) {
       inner = inner || name.starts_with(usual);

@@ -9,55 +9,54 @@
 
 namespace anchorsplat {
 
-// Where the pictures of a camera file may lie.
+// Where to search for the images of a camera file.
 struct PicturePlaces {
-  std::vector<std::filesystem::path> folders;  // that the file's paths begin in, the likeliest first
-  std::filesystem::path project;               // below which they are searched otherwise; empty: nowhere
-  bool originals = false;  // whether they are as the camera took them, where undistorted ones may lie beside them
-  bool masks = false;      // what is looked for are masks
-  bool complete = false;   // whether the file is meant to name all pictures, so that others are worth a word
+  std::vector<std::filesystem::path> folders;  // that the file's paths are relative to, likeliest first
+  std::filesystem::path project;               // searched recursively otherwise; empty: not
+  bool originals = false;                      // prefer originals over undistorted images beside them
+  bool masks = false;                          // search for masks
+  bool complete = false;                       // the file should name all images, so report others
 };
 
-// What became of a path in a camera file.
+// Result for a path in a camera file.
 struct FoundPicture {
-  std::string name;            // of the view: below the file's other pictures, with '/', without a picture's extension
-  std::filesystem::path file;  // the picture; where there is none, the first path that was tried
-  std::filesystem::path mask;  // of it; empty where there is none
-  std::string unclear;         // why there is none where two are as likely: a message that names both
+  std::string name;            // view name: path relative to the file's other images, with '/', without extension
+  std::filesystem::path file;  // the image; if not found, the first path tried
+  std::filesystem::path mask;  // its mask; empty if there is none
+  std::string ambiguity;       // message that names two equally likely images, in which case none is taken
 };
 
-// The pictures that a camera file names, in its order. Paths may be another machine's: '\' is '/', "%20" a space, the
-// case of letters and the kind of picture may differ (.JPG, .jpeg, .png, none). A folder of the file is one folder
-// here: the one that it says; else, below `project`, the one that has pictures of these names and the longest end of
-// its path in common, then `images`, `input`, others (`images_2` last; masks, depth maps and what this program rendered
-// into any other folder are no photographs). Pictures that are found are recorded as inputs, but for our own
-// renderings, which are inputs of who opens them. With `complete`, one message tells of pictures beside them that no
-// name means.
+// Finds the images that a camera file names, in its order. Paths may come from another machine: '\' is '/', "%20" a
+// space, and letter case and image type may differ (.JPG, .jpeg, .png, none). All paths with one folder are resolved to
+// one folder: the given one; else, below `project`, one that contains these names and shares the longest path suffix,
+// then `images`, `input`, others (`images_2` last). Masks, depth maps and our renderings in unusual folders are not
+// photographs. Images found are recorded as inputs, except our own renderings, which are recorded when opened. With
+// `complete`, a message reports images beside them that no name means.
 std::vector<FoundPicture> FindPictures(const PicturePlaces& places, std::span<const std::string> names);
 
-// The same for cameras whose `image` is the path in the file: sets their names, pictures and masks. The picture of a
-// camera without one is where it was looked for first.
+// The same for cameras whose `image` is the path in the file: sets names, images and masks. A missing image becomes the
+// first path tried.
 void FindPicturesOf(const PicturePlaces& places, std::span<Camera> cameras);
 
-// Keeps what FindPictures finds unclear on this thread while this is open, below whatever reader asks it: an error for
-// who needs the pictures, nothing for who needs the cameras alone.
-class UnclearPictures {
+// While open, collects ambiguities that FindPictures meets on this thread, through any reader: an error for callers
+// that need images, ignored by those that need only cameras.
+class AmbiguousPictures {
  public:
-  UnclearPictures();
-  ~UnclearPictures();
-  UnclearPictures(const UnclearPictures&) = delete;
-  UnclearPictures& operator=(const UnclearPictures&) = delete;
+  AmbiguousPictures();
+  ~AmbiguousPictures();
+  AmbiguousPictures(const AmbiguousPictures&) = delete;
+  AmbiguousPictures& operator=(const AmbiguousPictures&) = delete;
 
-  const std::string& first() const { return first_; }  // message; empty: all is clear
+  const std::string& first() const { return first_; }  // message; empty: none
 
  private:
   friend std::vector<FoundPicture> FindPictures(const PicturePlaces& places, std::span<const std::string> names);
 
-  UnclearPictures* outer_;
+  AmbiguousPictures* outer_;
   std::string first_;
 };
 
-// The project's folder of a file or a model in it: above folders called sparse, colmap, 0, dense and the like.
+// The project folder of a file or model: above folders named sparse, colmap, 0, dense and the like.
 std::filesystem::path ProjectAbove(const std::filesystem::path& folder);
 
 }  // namespace anchorsplat

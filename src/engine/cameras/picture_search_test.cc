@@ -24,7 +24,7 @@ void Put(const fs::path& path) {
 FoundPicture FindOne(const PicturePlaces& places, const std::string& name) {
   const std::vector<std::string> names = {name};
   FoundPicture found = FindPictures(places, names).at(0);
-  EXPECT_EQ(found.unclear, "");
+  EXPECT_EQ(found.ambiguity, "");
   return found;
 }
 
@@ -110,12 +110,12 @@ TEST(FindPictures, WhatIsAmbiguousNamesBoth) {
   auto found = FindPictures(places, names);
   EXPECT_FALSE(fs::exists(found[0].file));
   for (const char* place : {"left", "right"}) {
-    EXPECT_NE(found[0].unclear.find((folder / place).string()), std::string::npos) << found[0].unclear;
+    EXPECT_NE(found[0].ambiguity.find((folder / place).string()), std::string::npos) << found[0].ambiguity;
   }
   {
-    const UnclearPictures unclear;
+    const AmbiguousPictures ambiguous;
     (void)FindPictures(places, names);
-    EXPECT_EQ(unclear.first(), found[0].unclear);
+    EXPECT_EQ(ambiguous.first(), found[0].ambiguity);
   }
   EXPECT_EQ(FindOne(places, "/elsewhere/right/a.png").file, folder / "right/a.png");
   Put(folder / "left/b.jpg");
@@ -123,7 +123,7 @@ TEST(FindPictures, WhatIsAmbiguousNamesBoth) {
   names = {"left/b.png"};
   found = FindPictures(places, names);
   for (const char* name : {"b.jpg", "b.webp"}) {
-    EXPECT_NE(found[0].unclear.find(name), std::string::npos) << found[0].unclear;
+    EXPECT_NE(found[0].ambiguity.find(name), std::string::npos) << found[0].ambiguity;
   }
   EXPECT_EQ(FindOne(places, "left/b.jpeg").file, folder / "left/b.jpg");
   Put(folder / "left/b.png");
@@ -144,13 +144,13 @@ TEST(FindPictures, WhatWeRenderedIsNoPhotograph) {
   EXPECT_EQ(FindOne(places, "cam0/a.png").file, folder / "cam0/a.png");
   Put(folder / "photographs/a.png");
   EXPECT_EQ(FindOne(places, "a.png").file, folder / "photographs/a.png");
-  EXPECT_FALSE(CheckIsNoInput(folder / "photographs/a.png").ok());
+  EXPECT_FALSE(CheckNotInput(folder / "photographs/a.png").ok());
   // Where everybody has pictures, and where the file says, they may be what is trained on; until then they may be
   // rendered again.
   render("images");
   for (const char* place : {"images/a.png", "before/a.png"}) {
     EXPECT_EQ(FindOne(places, place).file, folder / place);
-    EXPECT_TRUE(CheckIsNoInput(folder / place).ok()) << place;
+    EXPECT_TRUE(CheckNotInput(folder / place).ok()) << place;
   }
   EXPECT_EQ(FindOne(places, "a.png").file, folder / "images/a.png");
 }

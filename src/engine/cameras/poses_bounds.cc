@@ -24,10 +24,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr uint64_t kMostBytes = uint64_t{1} << 28;  // a million views and a half
+constexpr uint64_t kMostBytes = uint64_t{1} << 28;  // 1.5 million views
 constexpr size_t kRow = 17;
 
-// An array of doubles or floats as NumPy's format 1.0 to 3.0 holds it
+// An array of doubles or floats in NumPy's format 1.0 to 3.0
 // (numpy.org/doc/stable/reference/generated/numpy.lib.format.html).
 struct NumpyArray {
   int item = 0;  // bytes
@@ -36,7 +36,7 @@ struct NumpyArray {
   size_t begin = 0;  // byte of the data
 };
 
-// The text behind "'key':" in the header's dictionary, which is always written by repr().
+// The text after "'key':" in the header's dictionary, which is written by repr().
 std::string_view ValueOf(std::string_view header, std::string_view key) {
   const size_t at = header.find(Cat("'", key, "':"));
   if (at == std::string_view::npos) return {};
@@ -104,7 +104,7 @@ double NumberAt(std::string_view bytes, const NumpyArray& array, uint64_t row, u
   return value;
 }
 
-// Pictures of a folder, sorted by name; of folders there are none.
+// Images of a folder, sorted by name; subfolders are ignored.
 Result<std::vector<fs::path>> PicturesBeside(const fs::path& file) {
   std::vector<fs::path> pictures;
   const fs::path base = file.has_parent_path() ? file.parent_path() : fs::path(".");
@@ -131,7 +131,7 @@ Result<Camera> CameraOf(const std::array<double, kRow>& v) {
   Camera camera;
   camera.intrinsics = {static_cast<int>(width), static_cast<int>(height), focal, focal, 0.5 * width, 0.5 * height};
   ANCHORSPLAT_RETURN_IF_ERROR(CheckIntrinsics(camera.intrinsics));
-  // Columns down, right, back to OpenGL's right, up, back.
+  // From columns down, right, back to OpenGL's right, up, back.
   ANCHORSPLAT_ASSIGN_OR_RETURN(camera.world_to_camera,
                                PoseFromOpenGlCameraToWorld({v[1], -v[0], v[2], v[3], v[6], -v[5], v[7], v[8], v[11],
                                                             -v[10], v[12], v[13], 0, 0, 0, 1}));

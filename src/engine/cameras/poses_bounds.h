@@ -10,19 +10,19 @@
 
 namespace anchorsplat {
 
-// LLFF's poses_bounds.npy (Mildenhall et al. 2019, https://github.com/Fyusion/LLFF): per view 17 numbers, a 3×5 matrix
-// row by row and the nearest and farthest depth. The matrix is camera-to-world with the columns down, right, back,
-// centre, and (height, width, focal length) in pixels; the principal point is the middle. What lens there was it does
-// not say.
+// Reads LLFF's poses_bounds.npy (Mildenhall et al. 2019, https://github.com/Fyusion/LLFF): 17 numbers per view, a
+// row-major 3×5 matrix and the nearest and farthest depth. The matrix is camera-to-world with columns down, right,
+// back, centre, and (height, width, focal length) in pixels; the principal point is the centre. The lens is not
+// recorded.
 //
-// Nor does it name the pictures: they are those of `images` beside it, or of the first of images_2, images_4, images_8,
-// in the order of their names, and must be as many. Without such a folder views are called 000, 001 …
+// Image names are not recorded either: images are those of `images` beside it, or of the first of images_2, images_4,
+// images_8, sorted by name, and their number must match. Without such a folder, views are named 000, 001 …
 //
-// Errors: kNotFound, kIo; kBadFile with the byte or the view: no array of N × 17 floats or doubles, fewer bytes than it
-// says, poses that are no rotations, another number of pictures.
+// Errors: kNotFound, kIo; kBadFile with the byte or view: not an N × 17 array of floats or doubles, too few bytes, a
+// pose that is not a rotation, another number of images.
 Result<CameraSet> ReadPosesBounds(const std::filesystem::path& path);
 
-// The same of bytes that are in memory; `name` is what messages call them, `pictures` are those of the views.
+// The same for bytes in memory; `name` is used in messages, `pictures` are the view's images.
 Result<CameraSet> ParsePosesBounds(const std::string& name, std::string_view bytes,
                                    std::span<const std::filesystem::path> pictures);
 

@@ -15,7 +15,7 @@
 
 namespace anchorsplat {
 
-// For tests: views of one lens around a point, as files of several programs give them.
+// For tests: views around a point with a common lens, for camera files of several programs.
 
 inline void WriteText(const std::filesystem::path& path, const std::string& text) {
   std::filesystem::remove(path);
@@ -23,7 +23,7 @@ inline void WriteText(const std::filesystem::path& path, const std::string& text
   std::ofstream(path, std::ios::binary) << text;
 }
 
-// Every digit, and a blank behind each number.
+// All digits, each number followed by a space.
 template <typename Numbers>
 std::string Digits(const Numbers& numbers) {
   std::ostringstream out;
@@ -34,8 +34,7 @@ std::string Digits(const Numbers& numbers) {
 
 inline constexpr int kRigWidth = 64, kRigHeight = 48;
 
-// "a", "b", … of 64 × 48 pixels around `target`, 3 units away, through a Brown lens whose principal point is not the
-// middle.
+// Cameras "a", "b", … of 64 × 48 pixels, 3 units from `target`, with a Brown lens and an off-centre principal point.
 inline std::vector<Camera> RigForTest(int count, const std::array<double, 3>& target = {0, 0, 0}) {
   std::vector<Camera> rig;
   for (int i = 0; i < count; ++i) {
@@ -67,7 +66,7 @@ inline void WritePicturesOf(const std::vector<Camera>& rig, const std::filesyste
   }
 }
 
-// The pixel of a point of the world in the picture as it was taken.
+// Pixel of a world point in the distorted image.
 inline PlanePoint PixelOf(const Camera& camera, const std::array<double, 3>& point) {
   const auto p = camera.ToCamera(point);
   const PlanePoint place = Distort(camera.photograph.lens, {p[0] / p[2], p[1] / p[2]});
@@ -75,7 +74,7 @@ inline PlanePoint PixelOf(const Camera& camera, const std::array<double, 3>& poi
   return {k.fx * place[0] + k.cx, k.fy * place[1] + k.cy};
 }
 
-// The same views, by where they draw points around `target`.
+// Checks that both sets project points around `target` to the same pixels.
 inline void ExpectSamePixels(const std::vector<Camera>& found, const std::vector<Camera>& rig,
                              const std::array<double, 3>& target = {0, 0, 0}, double tolerance = 1e-9) {
   ASSERT_EQ(found.size(), rig.size());

@@ -19,14 +19,14 @@ namespace anchorsplat {
 
 namespace {
 
-// A frame's own value, else the file's.
+// The frame's value, else the file's.
 std::optional<JsonValue> FindEither(const JsonValue& frame, const JsonValue& root, const char* key) {
   auto found = frame.Find(key);
   return found ? found : root.Find(key);
 }
 
-// Focal length in pixels along one axis of `size` pixels, given directly or as a field of view. A frame's field of view
-// wins over the file's focal length: the nearer statement is the more specific one.
+// Focal length in pixels along an axis of `size` pixels, given directly or as a field of view. A frame's field of view
+// takes precedence over the file's focal length, as it is more specific.
 Result<std::optional<double>> FindFocal(const JsonValue& frame, const JsonValue& root, const char* focal_key,
                                         const char* angle_key, int size) {
   for (const JsonValue* level : {&frame, &root}) {
@@ -45,7 +45,7 @@ Result<std::optional<double>> FindFocal(const JsonValue& frame, const JsonValue&
   return std::optional<double>();
 }
 
-// A frame's own number, else the file's; 0 where neither has it.
+// The frame's number, else the file's, else 0.
 Result<double> NumberOrZero(const JsonValue& frame, const JsonValue& root, const char* key) {
   const auto value = FindEither(frame, root, key);
   if (!value || value->raw().is_null()) return 0.0;
@@ -54,8 +54,8 @@ Result<double> NumberOrZero(const JsonValue& frame, const JsonValue& root, const
   return number;
 }
 
-// The lens by `camera_model` (OPENCV where nobody says), nerfstudio's k1 … k4, p1, p2 or its list `distortion_params`
-// of the same six, which wins as there; and FULL_OPENCV's k5, k6, which make k4 … k6 the terms of its denominator.
+// The lens by `camera_model` (default OPENCV): nerfstudio's k1 … k4, p1, p2, or its list `distortion_params` of the
+// same six, which takes precedence as in nerfstudio; and FULL_OPENCV's k5, k6, with which k4 … k6 are the denominator.
 Result<Lens> ReadLens(const JsonValue& frame, const JsonValue& root) {
   Lens lens{.model = LensModel::kRadial};
   bool full = false;
@@ -101,7 +101,7 @@ Result<Lens> ReadLens(const JsonValue& frame, const JsonValue& root) {
       return frame.Complain("a fisheye lens with k5, k6, p1 or p2; only k1 to k4 are known of it");
     }
   }
-  return lens.IsStraight() ? Lens{} : lens;
+  return lens.IsIdentity() ? Lens{} : lens;
 }
 
 Result<Pinhole> ReadIntrinsics(const JsonValue& frame, const JsonValue& root, const FoundPicture& picture) {
@@ -112,7 +112,7 @@ Result<Pinhole> ReadIntrinsics(const JsonValue& frame, const JsonValue& root, co
     ANCHORSPLAT_ASSIGN_OR_RETURN(c.height, height->WholeNumber(1, kMaxImageSide));
   } else {
     if (!IsFile(picture.file)) {
-      if (!picture.unclear.empty()) return frame.Complain(picture.unclear);
+      if (!picture.ambiguity.empty()) return frame.Complain(picture.ambiguity);
       return frame.Complain(Cat("neither \"w\" and \"h\" nor a picture to take the size from (looked for at ",
                                 Printable(picture.file.string()), ")"));
     }
@@ -137,8 +137,7 @@ Result<Pinhole> ReadIntrinsics(const JsonValue& frame, const JsonValue& root, co
   return c;
 }
 
-// Whether the matrices are in OpenCV's axes (x right, y down, z forward): nobody's files say it but ours, for people
-// whose files are so.
+// Whether the matrices are in OpenCV axes (x right, y down, z forward). Our extension, for users whose files are so.
 Result<bool> IsInOpenCvAxes(const JsonValue& root) {
   const auto value = root.Find("camera_axes");
   if (!value || value->raw().is_null()) return false;
@@ -168,7 +167,7 @@ Result<Pose> ReadPose(const JsonValue& matrix, bool opencv_axes) {
   return pose;
 }
 
-// The path of a picture or a mask; empty where there is none and need not be.
+// Path of an image or mask; empty if absent and optional.
 Result<std::string> PathIn(const JsonValue& frame, const char* key, bool required) {
   const auto value = frame.Find(key);
   if (!required && (!value || value->raw().is_null())) return std::string();
@@ -190,7 +189,7 @@ Result<std::vector<std::string>> PathsOf(std::span<const JsonValue> frames, cons
   return paths;
 }
 
-// The frames' pictures, and their masks where `mask_path` says them, else where they lie in the folder `masks`.
+// Images of the frames, and masks by `mask_path`, else from the folder `masks`.
 Result<std::vector<FoundPicture>> FindPicturesOfFrames(std::span<const JsonValue> frames,
                                                        const std::filesystem::path& folder, bool complete) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<std::string> names, PathsOf(frames, "file_path", true));
@@ -204,9 +203,9 @@ Result<std::vector<FoundPicture>> FindPicturesOfFrames(std::span<const JsonValue
   for (size_t i = 0; i < frames.size(); ++i) {
     if (masks[i].empty()) continue;
     found[i].mask = IsFile(found_masks[i].file) ? found_masks[i].file : std::filesystem::path();
-    // Without its mask a picture would be taken for right where it is said to be wrong.
-    if (found[i].unclear.empty()) found[i].unclear = found_masks[i].unclear;
-    if (found[i].mask.empty() && found[i].unclear.empty() && IsFolder(folder)) {
+    // Without its mask, masked pixels would be taken as correct.
+    if (found[i].ambiguity.empty()) found[i].ambiguity = found_masks[i].ambiguity;
+    if (found[i].mask.empty() && found[i].ambiguity.empty() && IsFolder(folder)) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue value, frames[i].Get("mask_path"));
       return frames[i].Named(value.Complain(Cat("there is no mask ", Printable(masks[i]), " in ", folder.string())),
                              "file_path");
@@ -215,36 +214,36 @@ Result<std::vector<FoundPicture>> FindPicturesOfFrames(std::span<const JsonValue
   return found;
 }
 
-// Frames mostly share one lens, and to find its pinhole takes a while.
-class StraightPinholes {
+// Cached, as frames mostly share a lens and its undistorted pinhole is slow to find.
+class UndistortedPinholes {
  public:
-  Result<Pinhole> Of(const Lens& lens, const Pinhole& bent, const JsonValue& frame) {
-    if (last_ && last_->lens == lens && last_->bent == bent) return last_->straight;
-    auto straight = StraightPinhole(lens, bent);
-    if (!straight.ok()) return frame.Complain(straight.error().message);
-    last_ = {lens, bent, *straight};
-    return *straight;
+  Result<Pinhole> Of(const Lens& lens, const Pinhole& distorted, const JsonValue& frame) {
+    if (last_ && last_->lens == lens && last_->distorted == distorted) return last_->undistorted;
+    auto undistorted = UndistortedPinhole(lens, distorted);
+    if (!undistorted.ok()) return frame.Complain(undistorted.error().message);
+    last_ = {lens, distorted, *undistorted};
+    return *undistorted;
   }
 
  private:
   struct Known {
     Lens lens;
-    Pinhole bent, straight;
+    Pinhole distorted, undistorted;
   };
   std::optional<Known> last_;
 };
 
 Result<Camera> ReadFrame(const JsonValue& frame, const JsonValue& root, FoundPicture picture, bool opencv_axes,
-                         StraightPinholes& straight) {
+                         UndistortedPinholes& undistorted) {
   Camera camera;
   ANCHORSPLAT_ASSIGN_OR_RETURN(camera.intrinsics, ReadIntrinsics(frame, root, picture));
   camera.name = std::move(picture.name);
   camera.image = std::move(picture.file);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Lens lens, ReadLens(frame, root));
-  if (!lens.IsStraight()) {
+  if (!lens.IsIdentity()) {
     camera.photograph.lens = lens;
     camera.photograph.intrinsics = camera.intrinsics;
-    ANCHORSPLAT_ASSIGN_OR_RETURN(camera.intrinsics, straight.Of(lens, camera.intrinsics, frame));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(camera.intrinsics, undistorted.Of(lens, camera.intrinsics, frame));
   }
   camera.photograph.mask = std::move(picture.mask);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue matrix, frame.Get("transform_matrix"));
@@ -274,9 +273,9 @@ Result<CameraSet> CamerasFromTransforms(const JsonValue& root, const std::filesy
   if (elements.empty()) return frames.Complain("expected at least one frame");
   ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<FoundPicture> pictures, FindPicturesOfFrames(elements, folder, complete));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const bool opencv_axes, IsInOpenCvAxes(root));
-  StraightPinholes straight;
+  UndistortedPinholes undistorted;
   for (size_t i = 0; i < elements.size(); ++i) {
-    auto camera = ReadFrame(elements[i], root, std::move(pictures[i]), opencv_axes, straight);
+    auto camera = ReadFrame(elements[i], root, std::move(pictures[i]), opencv_axes, undistorted);
     if (!camera.ok()) return elements[i].Named(camera.error(), "file_path");
     set.cameras.push_back(*std::move(camera));
   }

@@ -13,7 +13,7 @@ namespace anchorsplat {
 
 namespace {
 
-using Json = nlohmann::ordered_json;  // keys in the order a person would write them
+using Json = nlohmann::ordered_json;  // keys in a readable order
 
 struct IntrinsicsKey {
   const char* name;
@@ -28,13 +28,13 @@ constexpr IntrinsicsKey kKeys[] = {
     {"h", [](const Pinhole& c) { return static_cast<double>(c.height); }},
 };
 
-// Whole numbers without ".0", as w and h are expected.
+// Writes whole numbers without ".0", as expected for w and h.
 Json Number(double value) {
   if (value == std::floor(value) && std::abs(value) < 1e15) return static_cast<int64_t>(value);
   return value;
 }
 
-// The double with the fewest digits that is the same float: 0.1, not 0.10000000149.
+// The double with the fewest digits that rounds to the same float: 0.1, not 0.10000000149.
 double ShortestDouble(float value) {
   char text[64];
   const auto written = std::to_chars(text, text + sizeof text, value);
@@ -86,7 +86,7 @@ Status WriteTransforms(const std::filesystem::path& path, const CameraSet& camer
   std::string text;
   try {
     text = root.dump(1) + "\n";
-  } catch (const Json::exception&) {  // the only thing dump() objects to
+  } catch (const Json::exception&) {  // dump() fails only on invalid UTF-8
     return Error{ErrorCode::kBadArgument, Cat(path.string(), ": a view's name is not UTF-8, which JSON needs")};
   }
   return WriteWholeFile(path, text, options.overwrite);

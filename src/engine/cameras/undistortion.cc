@@ -15,34 +15,33 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr double kShortest = 0.2, kLongest = 2;  // sides of the pinhole's picture, in those of the lens's
-constexpr int kMostBorderPoints = 4096;          // that are looked at per side
+constexpr double kShortest = 0.2, kLongest = 2;  // limits of the undistorted size relative to the original
+constexpr int kMostBorderPoints = 4096;          // sampled per side
 constexpr int kRowsPerTask = 8;
-// Of the circle that fits into the picture, what a lens must draw. Polynomials of true lenses fold beyond what they
-// were fitted to, if at all; a fisheye's circle may be smaller than the picture.
+// Fraction of the inscribed circle that the lens must cover. Polynomials of real lenses fold only beyond the image, if
+// at all; a fisheye's circle may be smaller than the image.
 constexpr double kLeastOfRadial = 0.75, kLeastOfFisheye = 0.5;
-constexpr int kDirections = 64;  // in which that is looked at
+constexpr int kDirections = 64;  // sampled for that check
 
-// Along one axis: how far from the principal point the picture's two borders are seen by the pinhole, at their nearest
-// to it.
+// Undistorted distances of the two image borders from the principal point along an axis, at their nearest.
 struct Borders {
   double low = std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
 };
 
-// The pinhole's side, in those of the lens's, where nothing bounds it.
+// Scale of a side, without limits.
 double SideScale(const Borders& borders, double size, double principal) {
   return 1 / std::max(principal / borders.low, (size - 0.5 - principal) / borders.high);
 }
 
-// "k1 = -50, p2 = 0.1": what the lens does not have at 0.
+// The non-zero coefficients: "k1 = -50, p2 = 0.1".
 std::string Coefficients(const Lens& lens) {
   std::string text;
   const auto add = [&text](const char* name, size_t number, double value) {
     if (value != 0) text += Cat(text.empty() ? "" : ", ", name, number, " = ", value);
   };
   for (size_t i = 0; i < lens.radial.size(); ++i) add("k", i + 1, lens.radial[i]);
-  // As FULL_OPENCV and transforms.json call them.
+  // Names of FULL_OPENCV and transforms.json.
   for (size_t i = 0; i < lens.denominator.size(); ++i) add("k", i + 4, lens.denominator[i]);
   for (size_t i = 0; i < lens.tangential.size(); ++i) add("p", i + 1, lens.tangential[i]);
   if (lens.skew != 0) text += Cat(text.empty() ? "" : ", ", "skew = ", lens.skew);
@@ -54,13 +53,14 @@ Error BadLens(const Lens& lens, const std::string& what) {
                                         "; no lens draws so: mend the coefficients, or undistort the pictures first")};
 }
 
-// Whether every place on a circle around the picture's middle is one that the lens draws.
-bool DrawsTheMiddle(const LensInverse& inverse, const Pinhole& bent, double share) {
-  const double radius = share * 0.5 * std::min(bent.width, bent.height);
+// Whether the lens covers every point of a circle around the image centre.
+bool DrawsTheMiddle(const LensInverse& inverse, const Pinhole& distorted, double share) {
+  const double radius = share * 0.5 * std::min(distorted.width, distorted.height);
   for (int i = 0; i < kDirections; ++i) {
     const double angle = 2 * std::numbers::pi * i / kDirections;
-    const double u = 0.5 * bent.width + radius * std::cos(angle), v = 0.5 * bent.height + radius * std::sin(angle);
-    if (!inverse.Undistort({(u - bent.cx) / bent.fx, (v - bent.cy) / bent.fy})) return false;
+    const double u = 0.5 * distorted.width + radius * std::cos(angle),
+                 v = 0.5 * distorted.height + radius * std::sin(angle);
+    if (!inverse.Undistort({(u - distorted.cx) / distorted.fx, (v - distorted.cy) / distorted.fy})) return false;
   }
   return true;
 }
@@ -70,7 +70,7 @@ std::array<float, 4> CatmullRom(float t) {
   return {0.5f * (-v + 2 * u - t), 0.5f * (3 * v - 5 * u + 2), 0.5f * (-3 * v + 4 * u + t), 0.5f * (v - u)};
 }
 
-// rgb·alpha and alpha, as pictures are averaged; those without alpha as they are.
+// Premultiplies alpha, for averaging; images without alpha are unchanged.
 Image Premultiplied(const Image& image) {
   Image out = image;
   for (int c = 0; c < 3 && image.channels == 4; ++c) {
@@ -80,7 +80,7 @@ Image Premultiplied(const Image& image) {
   return out;
 }
 
-// Back to straight alpha, of pixel i; values are kept within 0 to 1, which cubics leave.
+// Converts pixel i back to straight alpha and clamps to 0–1, which cubics exceed.
 void Unpremultiply(Image& image, int64_t i) {
   for (int c = 0; c < image.channels; ++c) image.channel(c)[i] = std::clamp(image.channel(c)[i], 0.0f, 1.0f);
   if (image.channels != 4) return;
@@ -97,65 +97,66 @@ bool AnyIgnored(const Buffer<uint8_t>& ignored) {
 
 }  // namespace
 
-Result<Pinhole> StraightPinhole(const Lens& lens, const Pinhole& bent) {
-  if (lens.IsStraight()) return bent;
+Result<Pinhole> UndistortedPinhole(const Lens& lens, const Pinhole& distorted) {
+  if (lens.IsIdentity()) return distorted;
   const LensInverse inverse(lens);
   if (!(inverse.largest_radius() > 0)) {
     return BadLens(lens, "folds the picture at its middle");
   }
   const double least = lens.model == LensModel::kFisheye ? kLeastOfFisheye : kLeastOfRadial;
-  if (!DrawsTheMiddle(inverse, bent, least)) {
+  if (!DrawsTheMiddle(inverse, distorted, least)) {
     return BadLens(lens,
                    Cat("cannot be undone: it draws less than ", std::lround(100 * least), "% of the way from the ",
-                       bent.width, " x ", bent.height, " picture's middle to its border"));
+                       distorted.width, " x ", distorted.height, " picture's middle to its border"));
   }
   Borders x, y;
   const auto look = [&](double u, double v, double& nearest, size_t axis, double sign) {
-    const auto p = inverse.Undistort({(u - bent.cx) / bent.fx, (v - bent.cy) / bent.fy});
-    if (p) nearest = std::min(nearest, sign * (*p)[axis] * (axis == 0 ? bent.fx : bent.fy));
+    const auto p = inverse.Undistort({(u - distorted.cx) / distorted.fx, (v - distorted.cy) / distorted.fy});
+    if (p) nearest = std::min(nearest, sign * (*p)[axis] * (axis == 0 ? distorted.fx : distorted.fy));
   };
   const auto walk = [](int size, auto&& at) {
     const int count = std::min(size, kMostBorderPoints);
     for (int i = 0; i < count; ++i) at(count > 1 ? static_cast<int>(int64_t{i} * (size - 1) / (count - 1)) + 0.5 : 0.5);
   };
-  walk(bent.height, [&](double v) {
+  walk(distorted.height, [&](double v) {
     look(0.5, v, x.low, 0, -1);
-    look(bent.width - 0.5, v, x.high, 0, 1);
+    look(distorted.width - 0.5, v, x.high, 0, 1);
   });
-  walk(bent.width, [&](double u) {
+  walk(distorted.width, [&](double u) {
     look(u, 0.5, y.low, 1, -1);
-    look(u, bent.height - 0.5, y.high, 1, 1);
+    look(u, distorted.height - 0.5, y.high, 1, 1);
   });
-  const double wide = SideScale(x, bent.width, bent.cx), high = SideScale(y, bent.height, bent.cy);
+  const double wide = SideScale(x, distorted.width, distorted.cx), high = SideScale(y, distorted.height, distorted.cy);
   if (!(wide >= kShortest && high >= kShortest)) {
-    return BadLens(lens, Cat("leaves less than a fifth of the ", bent.width, " x ", bent.height,
+    return BadLens(lens, Cat("leaves less than a fifth of the ", distorted.width, " x ", distorted.height,
                              " picture's side when it is undone"));
   }
-  Pinhole out = bent;
-  out.width = std::max(1, static_cast<int>(std::min(wide, kLongest) * bent.width));
-  out.height = std::max(1, static_cast<int>(std::min(high, kLongest) * bent.height));
-  out.cx = bent.cx * out.width / bent.width;
-  out.cy = bent.cy * out.height / bent.height;
+  Pinhole out = distorted;
+  out.width = std::max(1, static_cast<int>(std::min(wide, kLongest) * distorted.width));
+  out.height = std::max(1, static_cast<int>(std::min(high, kLongest) * distorted.height));
+  out.cx = distorted.cx * out.width / distorted.width;
+  out.cy = distorted.cy * out.height / distorted.height;
   if (const Status status = CheckIntrinsics(out); !status.ok()) {
     return Error{ErrorCode::kBadFile, Cat("lens distortion, undone: ", status.error().message)};
   }
   return out;
 }
 
-ViewPicture Undistort(const ViewPicture& picture, const Lens& lens, const Pinhole& bent, const Pinhole& straight) {
+ViewPicture Undistort(const ViewPicture& picture, const Lens& lens, const Pinhole& distorted,
+                      const Pinhole& undistorted) {
   const Image source = Premultiplied(picture.image);
   const int width = source.width, height = source.height;
   const double largest = LensInverse(lens).largest_radius();
-  ViewPicture out{Image(straight.width, straight.height, source.channels),
-                  Buffer<uint8_t>(static_cast<size_t>(int64_t{straight.width} * straight.height))};
-  ParallelFor(0, straight.height, kRowsPerTask, [&](int64_t first, int64_t last) {
+  ViewPicture out{Image(undistorted.width, undistorted.height, source.channels),
+                  Buffer<uint8_t>(static_cast<size_t>(int64_t{undistorted.width} * undistorted.height))};
+  ParallelFor(0, undistorted.height, kRowsPerTask, [&](int64_t first, int64_t last) {
     for (int64_t row = first; row < last; ++row) {
-      for (int column = 0; column < straight.width; ++column) {
-        const int64_t at = row * straight.width + column;
-        const PlanePoint p = {(column + 0.5 - straight.cx) / straight.fx,
-                              (static_cast<double>(row) + 0.5 - straight.cy) / straight.fy};
+      for (int column = 0; column < undistorted.width; ++column) {
+        const int64_t at = row * undistorted.width + column;
+        const PlanePoint p = {(column + 0.5 - undistorted.cx) / undistorted.fx,
+                              (static_cast<double>(row) + 0.5 - undistorted.cy) / undistorted.fy};
         const PlanePoint d = Distort(lens, p);
-        const double u = bent.fx * d[0] + bent.cx, v = bent.fy * d[1] + bent.cy;
+        const double u = distorted.fx * d[0] + distorted.cx, v = distorted.fy * d[1] + distorted.cy;
         if (!(u >= 0 && u <= width && v >= 0 && v <= height) || std::hypot(p[0], p[1]) > largest) {
           out.ignored[static_cast<size_t>(at)] = 1;
           for (int c = 0; c < source.channels; ++c) out.image.channel(c)[at] = 0;

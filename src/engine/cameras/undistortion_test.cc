@@ -111,12 +111,12 @@ TEST(Undistortion, AgreesWithColmap) {
     ASSERT_EQ(mine->image.width, other->width);
     ASSERT_EQ(mine->image.height, other->height);
     const LensInverse inverse(camera.photograph.lens);
-    const Pinhole& bent = camera.photograph.intrinsics;
+    const Pinhole& distorted = camera.photograph.intrinsics;
     int dots = 0;
     double of_model = 0;
     for (int v = kStep / 2; v < kHeight; v += kStep) {
       for (int u = kStep / 2; u < kWidth; u += kStep) {
-        const auto p = inverse.Undistort({(u - bent.cx) / bent.fx, (v - bent.cy) / bent.fy});
+        const auto p = inverse.Undistort({(u - distorted.cx) / distorted.fx, (v - distorted.cy) / distorted.fy});
         if (!p) continue;
         const double x = a.fx * (*p)[0] + a.cx, y = a.fy * (*p)[1] + a.cy;
         const auto here = CentreNear(mine->image, x, y, 10), there = CentreNear(*other, x, y, 10);
@@ -134,7 +134,7 @@ TEST(Undistortion, AgreesWithColmap) {
 
 // Pixel by pixel: what is asked for is where the formulas say, and between pixels by the cubic.
 TEST(Undistortion, LooksUpWhereTheLensDraws) {
-  const Pinhole bent{60, 40, 50, 52, 31, 19};
+  const Pinhole distorted{60, 40, 50, 52, 31, 19};
   Image ramp(60, 40, 3);  // linear functions are kept by the cubic, away from the border
   for (int y = 0; y < 40; ++y) {
     for (int x = 0; x < 60; ++x) {
@@ -143,15 +143,15 @@ TEST(Undistortion, LooksUpWhereTheLensDraws) {
       ramp.at(2, y, x) = 0.5f;
     }
   }
-  const auto straight = StraightPinhole(kBarrel, bent);
-  ASSERT_TRUE(straight.ok());
-  const ViewPicture out = Undistort({ramp, {}}, kBarrel, bent, *straight);
+  const auto undistorted = UndistortedPinhole(kBarrel, distorted);
+  ASSERT_TRUE(undistorted.ok());
+  const ViewPicture out = Undistort({ramp, {}}, kBarrel, distorted, *undistorted);
   int compared = 0;
   for (int y = 0; y < out.image.height; ++y) {
     for (int x = 0; x < out.image.width; ++x) {
-      const PlanePoint d =
-          Distort(kBarrel, {(x + 0.5 - straight->cx) / straight->fx, (y + 0.5 - straight->cy) / straight->fy});
-      const double u = bent.fx * d[0] + bent.cx, v = bent.fy * d[1] + bent.cy;
+      const PlanePoint d = Distort(
+          kBarrel, {(x + 0.5 - undistorted->cx) / undistorted->fx, (y + 0.5 - undistorted->cy) / undistorted->fy});
+      const double u = distorted.fx * d[0] + distorted.cx, v = distorted.fy * d[1] + distorted.cy;
       if (u < 2 || v < 2 || u > 58 || v > 38) continue;
       ++compared;
       EXPECT_NEAR(out.image.at(0, y, x), u / 60, 1e-5);
@@ -166,10 +166,10 @@ TEST(Undistortion, LooksUpWhereTheLensDraws) {
 TEST(Undistortion, WhatIsNotSeenIsIgnored) {
   // A pincushion in a wider pinhole than the rule would take: the corners show nothing.
   const Lens lens{.model = LensModel::kRadial, .radial = {0.3, 0, 0, 0}};
-  const Pinhole bent{40, 40, 40, 40, 20, 20};
+  const Pinhole distorted{40, 40, 40, 40, 20, 20};
   Image white(40, 40, 4);
   std::fill(white.pixels.begin(), white.pixels.end(), 1.0f);
-  ViewPicture out = Undistort({white, {}}, lens, bent, bent);
+  ViewPicture out = Undistort({white, {}}, lens, distorted, distorted);
   EXPECT_EQ(out.ignored[0], 1);
   EXPECT_EQ(out.ignored[20 * 40 + 20], 0);
   EXPECT_EQ(out.image.at(3, 0, 0), 0);
@@ -177,14 +177,14 @@ TEST(Undistortion, WhatIsNotSeenIsIgnored) {
   // Next to an ignored pixel, too, and nowhere else.
   Buffer<uint8_t> ignored(1600, 0);
   ignored[20 * 40 + 20] = 1;
-  out = Undistort({white, ignored}, Lens{}, bent, bent);
+  out = Undistort({white, ignored}, Lens{}, distorted, distorted);
   EXPECT_EQ(out.ignored[20 * 40 + 20], 1);
   EXPECT_EQ(out.ignored[25 * 40 + 25], 0);
 }
 
 TEST(Undistortion, LensesThatCannotBeAreErrorsOrBounded) {
-  const Pinhole bent{640, 480, 400, 400, 320, 240};
-  EXPECT_EQ(StraightPinhole({.model = LensModel::kRadial, .radial = {-1e12, 0, 0, 0}}, bent).error().code,
+  const Pinhole distorted{640, 480, 400, 400, 320, 240};
+  EXPECT_EQ(UndistortedPinhole({.model = LensModel::kRadial, .radial = {-1e12, 0, 0, 0}}, distorted).error().code,
             ErrorCode::kBadFile);
   Random random(3);
   for (int i = 0; i < 300; ++i) {
@@ -194,16 +194,20 @@ TEST(Undistortion, LensesThatCannotBeAreErrorsOrBounded) {
       for (double& k : lens.denominator) k = std::tan(random.Uniform(-1.57, 1.57));
       for (double& p : lens.tangential) p = random.Uniform(-1, 1);
     }
-    const auto straight = StraightPinhole(lens, {64, 48, random.Uniform(1, 200), 50, random.Uniform(-50, 100), 24});
-    if (!straight.ok()) continue;
-    EXPECT_GE(straight->width, 12);
-    EXPECT_LE(straight->width, 128);
-    (void)Undistort({Image(64, 48, 3), {}}, lens, {64, 48, 50, 50, 32, 24}, *straight);
+    const auto undistorted =
+        UndistortedPinhole(lens, {64, 48, random.Uniform(1, 200), 50, random.Uniform(-50, 100), 24});
+    if (!undistorted.ok()) continue;
+    EXPECT_GE(undistorted->width, 12);
+    EXPECT_LE(undistorted->width, 128);
+    const ViewPicture out = Undistort({Image(64, 48, 3), {}}, lens, {64, 48, 50, 50, 32, 24}, *undistorted);
+    EXPECT_EQ(out.image.width, undistorted->width);
+    EXPECT_EQ(out.image.height, undistorted->height);
+    EXPECT_TRUE(out.ignored.empty() || std::ssize(out.ignored) == out.image.plane());
   }
 }
 
 TEST(Undistortion, LensesThatMakeNoSenseAreRefusedWithTheirCoefficients) {
-  const Pinhole bent{400, 300, 400, 400, 200, 150};
+  const Pinhole distorted{400, 300, 400, 400, 200, 150};
   const auto radial = [](double k1, double k2 = 0) {
     return Lens{.model = LensModel::kRadial, .radial = {k1, k2, 0, 0}};
   };
@@ -219,10 +223,10 @@ TEST(Undistortion, LensesThatMakeNoSenseAreRefusedWithTheirCoefficients) {
       {{.model = LensModel::kFisheye, .radial = {1e9, 0, 0, 0}}, "k1 = 1e+09"},
   };
   for (const auto& [lens, words] : bad) {
-    const auto straight = StraightPinhole(lens, bent);
-    ASSERT_FALSE(straight.ok()) << words << ": " << straight->width << " x " << straight->height;
-    EXPECT_EQ(straight.error().code, ErrorCode::kBadFile);
-    EXPECT_NE(straight.error().message.find(words), std::string::npos) << straight.error().message;
+    const auto undistorted = UndistortedPinhole(lens, distorted);
+    ASSERT_FALSE(undistorted.ok()) << words << ": " << undistorted->width << " x " << undistorted->height;
+    EXPECT_EQ(undistorted.error().code, ErrorCode::kBadFile);
+    EXPECT_NE(undistorted.error().message.find(words), std::string::npos) << undistorted.error().message;
   }
 }
 
@@ -247,9 +251,9 @@ TEST(Undistortion, RealLensesAreNotRefused) {
       {"whole circle in 2:1", {.model = LensModel::kFisheye}, {3840, 1920, 611, 611, 1920, 960}},
       {"cropped", {.model = LensModel::kRadial, .radial = {-0.1, 0.02, 0, 0}}, {500, 400, 900, 900, 700, 450}},
   };
-  for (const auto& [name, lens, bent] : real) {
-    const auto straight = StraightPinhole(lens, bent);
-    EXPECT_TRUE(straight.ok()) << name << ": " << straight.error().message;
+  for (const auto& [name, lens, distorted] : real) {
+    const auto undistorted = UndistortedPinhole(lens, distorted);
+    EXPECT_TRUE(undistorted.ok()) << name << ": " << undistorted.error().message;
   }
 }
 

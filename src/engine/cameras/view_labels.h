@@ -6,11 +6,11 @@
 
 namespace anchorsplat {
 
-// The names of views or paths of their pictures in parts: ViewName without ".", ".." and empty ones. {"cam0", "0000"}.
+// Splits a view name or image path into ViewName components, without "." and "..": {"cam0", "0000"}.
 std::vector<std::string> ViewParts(const std::string& name);
 
-// How views are called among each other: by the last part of their names where that tells them apart, else by all parts
-// but the folders that all have in common ("cam0/0000"). Names that are the same stay so.
+// Shortest labels: the last component if that is unique, else all components except the folders common to all
+// ("cam0/0000"). Equal names get equal labels.
 std::vector<std::string> ViewLabels(std::span<const std::string> names);
 
 }  // namespace anchorsplat

@@ -19,8 +19,8 @@
 #include "io/input_record.h"
 #include "metrics/compare.h"
 #include "metrics/image_metrics.h"
+#include "render/constant_cloud.h"
 #include "render/shown_range.h"
-#include "render/still_cloud.h"
 
 namespace anchorsplat {
 
@@ -43,7 +43,7 @@ class SplatViewSource : public ViewSource {
     const Camera& camera = cameras_.cameras[view];
     ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(still_, camera, options_, output_));
     if (!warned_) {
-      const std::string warning = NothingToSee(cloud_, camera, options_, rasterizer_.statistics().visible);
+      const std::string warning = EmptyPictureReason(cloud_, camera, options_, rasterizer_.statistics().visible);
       if (!warning.empty()) LogWarning(warning + " --near and --far say what is in range");
       warned_ = !warning.empty();
     }
@@ -59,7 +59,7 @@ class SplatViewSource : public ViewSource {
 
  private:
   GaussianCloud cloud_;
-  StillCloud still_{cloud_};
+  ConstantCloud still_{cloud_};
   CameraSet cameras_;
   RenderOptions options_;
   bool warned_ = false;  // of a view with nothing in it: one is enough

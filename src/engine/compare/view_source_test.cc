@@ -28,7 +28,7 @@ TEST(ViewSource, ShowsTheSameInAnyUnit) {
   CameraSet cameras = *ReadCameras(example / "transforms_hr.json");
   cameras.cameras.resize(2);
   for (Camera& camera : cameras.cameras) camera.intrinsics = Scaled(camera.intrinsics, 0.125);
-  const auto original = MakeSplatViews(cloud, cameras, OptionsFor(cloud));
+  const auto original = MakeSplatViews(cloud, cameras, DisplayOptions(cloud));
   for (const double unit : {1e-4, 0.003, 0.007, 1000.0, 1e5}) {
     GaussianCloud scaled = cloud;
     for (float& x : scaled.means) x = static_cast<float>(x * unit);
@@ -37,7 +37,7 @@ TEST(ViewSource, ShowsTheSameInAnyUnit) {
     for (Camera& camera : there.cameras) {
       for (double& x : camera.world_to_camera.translation) x *= unit;
     }
-    const auto views = MakeSplatViews(scaled, there, OptionsFor(scaled));
+    const auto views = MakeSplatViews(scaled, there, DisplayOptions(scaled));
     for (size_t view = 0; view < 2; ++view) {
       const auto psnr = Psnr(*views->Load(view), *original->Load(view));
       ASSERT_TRUE(psnr.ok());
@@ -67,7 +67,7 @@ TEST(ViewSource, CamerasOwnPicturesComeWithoutLensAndMasked) {
   camera.photograph.lens = {.model = LensModel::kRadial, .radial = {-0.1, 0, 0, 0}};
   camera.photograph.intrinsics = {40, 30, 40, 40, 20, 15};
   camera.photograph.mask = folder / "mask.png";
-  camera.intrinsics = *StraightPinhole(camera.photograph.lens, camera.photograph.intrinsics);
+  camera.intrinsics = *UndistortedPinhole(camera.photograph.lens, camera.photograph.intrinsics);
   CameraSet cameras;
   cameras.cameras = {camera};
   const auto own = OpenImageViews(folder / "images" / ".." / "images", {0, 0, 0}, cameras);

@@ -9,13 +9,13 @@
 namespace anchorsplat {
 
 namespace internal {
-// 64-byte aligned; from 4 MiB on 2 MiB-aligned and offered to the kernel for huge pages, because touching hundreds of
-// megabytes of fresh 4 KiB pages costs more than copying into them.
+// Allocates 64-byte aligned memory. From 4 MiB on it is 2 MiB-aligned and eligible for huge pages, because touching
+// hundreds of megabytes of fresh 4 KiB pages costs more than copying into them.
 void* AllocateBuffer(std::size_t bytes);
 void FreeBuffer(void* memory, std::size_t bytes) noexcept;
 }  // namespace internal
 
-// Allocator that leaves new elements uninitialised: arrays that are filled right away need not be zeroed first.
+// Allocator that leaves new elements uninitialised, for arrays that are filled right away.
 template <typename T>
 struct UninitializedAllocator {
   using value_type = T;
@@ -31,7 +31,7 @@ struct UninitializedAllocator {
 
   template <typename U>
   void construct(U* p) {
-    ::new (static_cast<void*>(p)) U;  // default-initialisation: nothing for numbers
+    ::new (static_cast<void*>(p)) U;  // default-initialisation: no work for numbers
   }
   template <typename U, typename... Args>
   void construct(U* p, Args&&... args) {
@@ -40,7 +40,7 @@ struct UninitializedAllocator {
   friend bool operator==(const UninitializedAllocator&, const UninitializedAllocator&) { return true; }
 };
 
-// A std::vector for bulk numbers: resize() does not initialise what it adds.
+// std::vector for bulk numbers: resize() leaves new elements uninitialised.
 template <typename T>
 using Buffer = std::vector<T, UninitializedAllocator<T>>;
 

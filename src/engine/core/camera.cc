@@ -47,7 +47,7 @@ std::array<double, 3> Camera::ToCamera(const std::array<double, 3>& p) const {
           r[6] * p[0] + r[7] * p[1] + r[8] * p[2] + t[2]};
 }
 
-Pose FromOrigin(const Pose& world_to_camera, const WorldOrigin& origin) {
+Pose RelativeToOrigin(const Pose& world_to_camera, const WorldOrigin& origin) {
   Pose pose = world_to_camera;
   for (size_t r = 0; r < 3; ++r) {
     const double* row = pose.rotation.data() + 3 * r;
@@ -56,13 +56,13 @@ Pose FromOrigin(const Pose& world_to_camera, const WorldOrigin& origin) {
   return pose;
 }
 
-Camera FromOrigin(Camera camera, const WorldOrigin& origin) {
-  camera.world_to_camera = FromOrigin(camera.world_to_camera, origin);
+Camera RelativeToOrigin(Camera camera, const WorldOrigin& origin) {
+  camera.world_to_camera = RelativeToOrigin(camera.world_to_camera, origin);
   return camera;
 }
 
-CameraSet FromOrigin(CameraSet set, const WorldOrigin& origin) {
-  for (Camera& camera : set.cameras) camera.world_to_camera = FromOrigin(camera.world_to_camera, origin);
+CameraSet RelativeToOrigin(CameraSet set, const WorldOrigin& origin) {
+  for (Camera& camera : set.cameras) camera.world_to_camera = RelativeToOrigin(camera.world_to_camera, origin);
   return set;
 }
 
@@ -132,7 +132,7 @@ Result<Pose> LookAt(const Vec3& center, const Vec3& target, const Vec3& up) {
 
 namespace {
 
-// Of a matrix that is no rotation: that it scales, or mirrors, or both; empty for what has no such name.
+// Describes how a matrix deviates from a rotation (scales, mirrors or both); empty for other deviations.
 std::string WhatIsWrong(const Vec3& right, const Vec3& up, const Vec3& back, double tolerance) {
   const double scale = std::sqrt(Dot(right, right)), area = scale * scale;
   if (!(scale > 0)) return "";

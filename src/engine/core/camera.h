@@ -14,7 +14,7 @@
 
 namespace anchorsplat {
 
-// Pinhole intrinsics in pixels; pixel (0,0) covers [0,1)², its centre is at 0.5.
+// Pinhole intrinsics in pixels. Pixel (0,0) covers [0,1)²; its centre is at (0.5, 0.5).
 struct Pinhole {
   int width = 0;
   int height = 0;
@@ -32,20 +32,20 @@ struct Pose {
   std::array<double, 3> translation = {0, 0, 0};
 };
 
-// How the file of a view's picture becomes that picture, where it is more than decoding: turned as EXIF says, through
-// the lens, averaged, masked (cameras/photograph.h).
+// How an image file becomes the picture of a view, beyond decoding: rotated by EXIF, undistorted, masked, downscaled
+// (cameras/photograph.h).
 struct Photograph {
   Lens lens;
-  Pinhole intrinsics;          // of the file's picture, upright, behind the lens; width 0: the camera's own
-  int orientation = 1;         // EXIF's, 1 to 8: how the file's rows and columns are turned before all else
-  int downscale = 1;           // pixels of the picture per side that become one of the view
-  std::filesystem::path mask;  // picture that is black where nothing is to be compared; may be empty
+  Pinhole intrinsics;          // of the image file, upright, before undistortion; width 0: the camera's own
+  int orientation = 1;         // EXIF orientation, 1 to 8, applied first
+  int downscale = 1;           // image pixels per side that are averaged into one view pixel
+  std::filesystem::path mask;  // image whose black pixels are excluded from comparison; may be empty
 };
 
 struct Camera {
-  std::string name;             // image path without extension, as the camera file gives it ("lr/001")
-  std::filesystem::path image;  // the view's picture where the camera file knows one; may be empty
-  Pinhole intrinsics;           // of the view: what is rendered and compared
+  std::string name;             // image path without extension, as in the camera file ("lr/001")
+  std::filesystem::path image;  // the view's image file; empty if the camera file names none
+  Pinhole intrinsics;           // of the view that is rendered and compared
   Pose world_to_camera;
   Photograph photograph;
 
@@ -53,51 +53,51 @@ struct Camera {
   std::array<double, 3> ToCamera(const std::array<double, 3>& p) const;  // R·p + t
 };
 
-// Which program's conventions a set of cameras came with; they differ in whether the size is the one trained at.
+// Format of the file that cameras were read from. Formats differ in whether the image size is the training size.
 enum class CameraSource { kUnknown, kTransforms, kInria, kColmap, kLlff };
 
 struct CameraSet {
   CameraSource source = CameraSource::kUnknown;
   std::vector<Camera> cameras;
-  std::optional<std::array<float, 3>> background;  // rgb 0–1, where the file says which one the views have
-  std::filesystem::path points;                    // a PLY with points of the scene, where the file names one
-  // Where the cameras were moved to another world than that of their file and its points: how.
+  std::optional<std::array<float, 3>> background;  // rgb 0–1, if the camera file gives one
+  std::filesystem::path points;                    // PLY of scene points, if the camera file names one
+  // How the cameras were moved away from the world of their file and of `points`, if they were.
   std::optional<Similarity> moved;
 };
 
-// The camera in a world that begins at `origin`: what a splat's means are in (core/world_origin.h).
-Pose FromOrigin(const Pose& world_to_camera, const WorldOrigin& origin);
-Camera FromOrigin(Camera camera, const WorldOrigin& origin);
-CameraSet FromOrigin(CameraSet set, const WorldOrigin& origin);
-// ChooseOrigin of the cameras' centres.
+// The camera in coordinates relative to `origin`, those of a splat's means (core/world_origin.h).
+Pose RelativeToOrigin(const Pose& world_to_camera, const WorldOrigin& origin);
+Camera RelativeToOrigin(Camera camera, const WorldOrigin& origin);
+CameraSet RelativeToOrigin(CameraSet set, const WorldOrigin& origin);
+// ChooseOrigin (core/world_origin.h) of the camera centres.
 WorldOrigin ChooseOrigin(const std::vector<Camera>& cameras);
 
-// The same view, up to scale, of a world that `move` has moved.
+// The pose that sees a world transformed by `move` as `world_to_camera` sees the original, up to scale.
 Pose Moved(const Pose& world_to_camera, const Similarity& move);
 
-// The same view with `factor` times as many pixels per side (width and height rounded, at least 1); the rays through
-// the image corners stay where they were, up to that rounding.
+// Resizes the view by `factor`: width and height are rounded, at least 1; the rays through the image corners stay the
+// same up to that rounding.
 Pinhole Scaled(const Pinhole& intrinsics, double factor);
 
-// The view that shows only `box` of the picture, which may reach beyond it.
+// Crops the view to `box`, which may reach beyond the picture.
 Camera Crop(const Camera& camera, const PixelBox& box);
 
-// Camera at `center` looking at `target`. `up` is the world's up; where it is parallel to the view direction, another
-// axis is taken. kBadArgument when center and target coincide or anything is not finite.
+// Pose of a camera at `center` that faces `target`. `up` is the world's up direction; another axis replaces it if it is
+// parallel to the view direction. kBadArgument: center and target coincide, or a value is not finite.
 Result<Pose> LookAt(const std::array<double, 3>& center, const std::array<double, 3>& target,
                     const std::array<double, 3>& up);
 
-// From camera-to-world in OpenGL axes (x right, y up, z backward), row-major 4×4: NeRF's `transform_matrix`.
-// kBadArgument when the upper 3×3 is not a rotation (up to uniform rounding, 1e-3) or something is not finite.
+// Pose from a row-major 4×4 camera-to-world matrix in OpenGL axes (x right, y up, z backward): NeRF's
+// `transform_matrix`. kBadArgument: the upper 3×3 is not a rotation (tolerance 1e-3), or a value is not finite.
 Result<Pose> PoseFromOpenGlCameraToWorld(const std::array<double, 16>& camera_to_world);
 std::array<double, 16> OpenGlCameraToWorld(const Pose& pose);
 
-// `count` poses on a Fibonacci sphere of `radius` around `target`, evenly spread, the same on every machine. Names are
-// "000", "001", … All share `intrinsics`. kBadArgument: count < 1, radius not positive.
+// `count` cameras evenly spread on a Fibonacci sphere of `radius` around `target`, the same on every machine, named
+// "000", "001", … with the same `intrinsics`. kBadArgument: count < 1 or radius not positive.
 Result<CameraSet> OrbitCameras(int count, double radius, const std::array<double, 3>& target,
                                const Pinhole& intrinsics);
 
-// Square pixels, centred principal point; `fov_x` is the horizontal field of view in radians.
+// Pinhole with square pixels, a centred principal point and a horizontal field of view of `fov_x` radians.
 Pinhole PinholeFromFov(int width, int height, double fov_x);
 
 }  // namespace anchorsplat

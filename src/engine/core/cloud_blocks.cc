@@ -28,7 +28,7 @@ MemoryBlocks::MemoryBlocks(GaussianCloud cloud) : MemoryBlocks(CloudView()) {
   origin_ = owned_.origin;
 }
 
-Status MemoryBlocks::ForEach(const Look& look) {
+Status MemoryBlocks::ForEach(const Visitor& visit) {
   if (!usable_known_) usable_.resize(static_cast<size_t>(size_));
   ParallelFor(0, size_, kCloudBlockRows, [&](int64_t first, int64_t last) {
     const auto begin = static_cast<size_t>(first), rows = static_cast<size_t>(last - first);
@@ -46,7 +46,7 @@ Status MemoryBlocks::ForEach(const Look& look) {
     block.rows.opacity_logits = cloud_.opacity_logits.subspan(begin, rows);
     block.rows.sh = colors;
     block.usable = std::span<const uint8_t>(usable_).subspan(begin, rows);
-    look(block);
+    visit(block);
   });
   usable_known_ = true;
   return {};
@@ -59,7 +59,7 @@ Status Study(CloudBlocks& blocks, std::span<RowStudy* const> studies) {
     std::ranges::copy_if(studies, std::back_inserter(left), [](const RowStudy* study) { return !study->done(); });
     if (left.empty()) return {};
     ANCHORSPLAT_RETURN_IF_ERROR(blocks.ForEach([&](const CloudBlock& block) {
-      for (RowStudy* const study : left) study->Look(block);
+      for (RowStudy* const study : left) study->Visit(block);
     }));
     for (RowStudy* const study : left) study->EndPass();
   }

@@ -13,18 +13,18 @@
 
 namespace anchorsplat {
 
-// Some neighbouring rows of a splat, without the harmonics that depend on the direction. Valid during a call.
+// Consecutive rows of a splat, with only the constant SH coefficient. Valid only during the call that receives it.
 struct CloudBlock {
-  int64_t first = 0;                // the row of the splat that is row 0 here; a multiple of kCloudBlockRows
-  CloudView rows;                   // SH degree 0; means from CloudBlocks::origin on
-  std::span<const uint8_t> usable;  // per row: 1 where IsUsable, looking at all of its harmonics
+  int64_t first = 0;                // row of the splat at index 0 of the block; a multiple of kCloudBlockRows
+  CloudView rows;                   // SH degree 0; means relative to CloudBlocks::origin
+  std::span<const uint8_t> usable;  // per row: 1 if IsUsable, all SH coefficients considered
 
   int64_t size() const { return rows.size(); }
 };
-inline constexpr int64_t kCloudBlockRows =
-    4096;  // of a block, the last may have fewer: they stay in a processor's cache
+// Rows of a block (the last may have fewer), so that it fits in the cache.
+inline constexpr int64_t kCloudBlockRows = 4096;
 
-// A splat to look at block by block, in memory or in a file that is larger than memory.
+// A splat that is read block by block, from memory or from a file larger than memory.
 class CloudBlocks {
  public:
   virtual ~CloudBlocks() = default;
@@ -37,9 +37,9 @@ class CloudBlocks {
   const std::vector<std::string>& comments() const { return comments_; }
   const WorldOrigin& origin() const { return origin_; }
 
-  // Calls `look` with every block once, from several threads in any order. May be called again. Errors: of reading.
-  using Look = std::function<void(const CloudBlock&)>;
-  virtual Status ForEach(const Look& look) = 0;
+  // Calls `visit` once per block, from several threads in any order. Can be called again. Errors: reading the file.
+  using Visitor = std::function<void(const CloudBlock&)>;
+  virtual Status ForEach(const Visitor& visit) = 0;
 
  protected:
   CloudBlocks() = default;
@@ -49,34 +49,33 @@ class CloudBlocks {
   std::optional<RenderMode> render_mode_;
   std::vector<std::string> comments_;
   WorldOrigin origin_ = {0, 0, 0};
-  // [N] CloudBlock::usable, known after ForEach has been through all rows for the first time.
+  // [N] CloudBlock::usable, valid once ForEach has visited all rows.
   std::vector<uint8_t> usable_;
   bool usable_known_ = false;
 };
 
-// Of columns in memory, which must stay where they are.
+// Blocks of columns in memory, which must outlive this object.
 class MemoryBlocks final : public CloudBlocks {
  public:
   explicit MemoryBlocks(const CloudView& cloud);
-  explicit MemoryBlocks(GaussianCloud cloud);  // keeps it
-  Status ForEach(const Look& look) override;
+  explicit MemoryBlocks(GaussianCloud cloud);  // takes ownership
+  Status ForEach(const Visitor& visit) override;
 
  private:
   GaussianCloud owned_;
   CloudView cloud_;
 };
 
-// What looks at all rows of a splat, once or more often, and remembers something of them whose size does not depend on
-// their number.
+// A computation over all rows of a splat in one or more passes. Its memory does not depend on the number of rows.
 class RowStudy {
  public:
   virtual ~RowStudy() = default;
-  virtual bool done() const = 0;                   // needs no further pass
-  virtual void Look(const CloudBlock& block) = 0;  // each block once in a pass, from several threads in any order
+  virtual bool done() const = 0;                    // no further pass needed
+  virtual void Visit(const CloudBlock& block) = 0;  // once per block and pass, from several threads in any order
   virtual void EndPass() = 0;
 };
 
-// Goes through the rows until all studies are done, for all of them at once. Errors: of reading.
+// Runs passes over `blocks`, shared by all studies, until every study is done. Errors: reading the file.
 Status Study(CloudBlocks& blocks, std::span<RowStudy* const> studies);
 
 }  // namespace anchorsplat

@@ -10,12 +10,12 @@
 
 namespace anchorsplat {
 
-// The columns of a splat that others own: a GaussianCloud, or arrays of a program that called us. Spaces, shapes and
-// names are those of GaussianCloud. What only looks at a cloud takes this, so that nobody has to copy one to be
-// looked at. Valid as long as the arrays stay where they are.
+// Borrowed columns of a splat: of a GaussianCloud, or arrays of a program that uses the library. Shapes, spaces and
+// names are those of GaussianCloud. Valid as long as the arrays are. Read-only code takes this type so that no caller
+// has to copy.
 struct CloudView {
   int sh_degree = 0;                      // 0–3
-  std::span<const float> means;           // [N,3] from `origin` on
+  std::span<const float> means;           // [N,3] relative to `origin`
   std::span<const float> log_scales;      // [N,3]
   std::span<const float> quats;           // [N,4]
   std::span<const float> opacity_logits;  // [N]
@@ -45,11 +45,11 @@ struct CloudView {
   int64_t sh_stride() const { return int64_t{3} * coefficients(); }  // floats of `sh` per Gaussian
 };
 
-// Those of core/gaussian_cloud.h.
+// As in core/gaussian_cloud.h.
 Status Validate(const CloudView& cloud);
 std::optional<Bounds> ComputeBounds(const CloudView& cloud);
 
-// Owners of their own, of all of it and of the given rows in that order. Errors: of Validate, rows that are not there.
+// Deep copies of the whole view and of the given rows, in that order. Errors: those of Validate; a row out of range.
 GaussianCloud CopyOf(const CloudView& view);
 Result<GaussianCloud> Subset(const CloudView& view, std::span<const int64_t> rows);
 

@@ -5,12 +5,11 @@
 
 namespace anchorsplat {
 
-// The folder of the running program itself, wherever links to it lie.
+// Folder of the running executable, with links resolved.
 std::filesystem::path ProgramFolder();
 
-// A file that this program uses at run time and that was built or installed with it (the LPIPS plugin, the training):
-// beside the program, as in a build folder, or in ../lib/anchorsplat, where `make install` puts what nobody calls by
-// name. The former where there is neither.
+// Path of a file built or installed with this program (the LPIPS plugin, the training program): beside the executable,
+// as in a build folder, or in ../lib/anchorsplat, where `make install` puts it. The former if neither exists.
 std::filesystem::path CompanionFile(const std::string& name,
                                     const std::filesystem::path& program_folder = ProgramFolder());
 

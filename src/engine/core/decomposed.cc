@@ -175,10 +175,10 @@ constexpr MarkedLetter kMarkedLetters[] = {
     {0x30FA, 0x30F2, 0x3099}, {0x30FE, 0x30FD, 0x3099},
 };
 
-// Korean syllables are told by number: 19 beginnings × 21 vowels × 28 ends, of which the first is none.
+// Korean syllables decompose by arithmetic: 19 initial consonants × 21 vowels × 28 finals, the first of which is none.
 constexpr uint32_t kSyllables = 0xAC00, kSyllableCount = 19 * 21 * 28;
 
-// A character of two or three bytes at `i`; 0 where there is another.
+// The two- or three-byte character at `i`; 0 if there is none.
 uint32_t CharacterAt(const std::string& text, size_t i, size_t& bytes) {
   const auto byte = [&](size_t k) { return i + k < text.size() ? static_cast<unsigned char>(text[i + k]) : 0u; };
   const auto follows = [&](size_t k) { return (byte(k) & 0xC0) == 0x80; };
@@ -226,7 +226,7 @@ std::string Decomposed(const std::string& text) {
   for (size_t i = 0; i < text.size();) {
     size_t bytes = 1;
     const uint32_t c = static_cast<unsigned char>(text[i]) < 0x80 ? 0 : CharacterAt(text, i, bytes);
-    if (c < 0x80) {  // of one byte, or written longer than it need be
+    if (c < 0x80) {  // one byte, or overlong
       out += text[i++];
       continue;
     }

@@ -7,17 +7,18 @@
 
 namespace anchorsplat {
 
-// Where rasterizing and what belongs to it is calculated: cpu, gpu, auto or the number of an adapter.
+// Where the rasterizer and related kernels run: on the CPU, a GPU, a GPU if there is one, or the adapter of that
+// number.
 struct DeviceChoice {
   enum class Kind { kCpu, kGpu, kAuto, kNumber };
   Kind kind = Kind::kCpu;
-  int number = 0;  // of kNumber
+  int number = 0;  // adapter number, for kNumber
 
   friend bool operator==(const DeviceChoice&, const DeviceChoice&) = default;
 };
 
-// "cpu", "gpu", "auto" or a whole number from 0 on. Error (kBadArgument): anything else.
+// Parses "cpu", "gpu", "auto" or a whole number ≥ 0. Error (kBadArgument): anything else.
 Result<DeviceChoice> ParseDeviceChoice(std::string_view word);
-std::string DeviceWord(const DeviceChoice& choice);  // its inverse
+std::string DeviceWord(const DeviceChoice& choice);  // inverse of ParseDeviceChoice
 
 }  // namespace anchorsplat

@@ -4,7 +4,7 @@
 
 namespace anchorsplat {
 
-// What an error is called wherever programs read it, in JSON: "not_found".
+// Name of an error code in JSON, for example "not_found".
 const char* CodeName(ErrorCode code);
 
 }  // namespace anchorsplat

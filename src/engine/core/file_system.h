@@ -5,11 +5,11 @@
 
 namespace anchorsplat {
 
-// What std::filesystem knows about a name, without its exceptions: a name that is too long, links that lead in a circle
-// and folders that may not be looked into are answers here, and errors with a sentence where the file is then opened.
-// Its functions are called elsewhere only with an error code (`make lint` looks).
+// std::filesystem queries that never throw: an overlong name, a cycle of links or an unreadable folder counts as absent
+// here and becomes an error message when the file is opened. All other code passes an error code to std::filesystem
+// (`make lint` checks).
 
-// Whether there is something under this name, a folder, a regular file; links are followed.
+// Whether anything, a folder, or a regular file exists at the path; links are followed.
 inline bool Exists(const std::filesystem::path& path) {
   std::error_code ignored;
   return std::filesystem::exists(path, ignored);
@@ -25,14 +25,14 @@ inline bool IsFile(const std::filesystem::path& path) {
   return std::filesystem::is_regular_file(path, ignored);
 }
 
-// Absolute, without links, "." and ".."; the path as it is where the system cannot say.
+// Absolute path without links, "." and ".."; unchanged if the system cannot resolve it.
 inline std::filesystem::path RealPath(const std::filesystem::path& path) {
   std::error_code failed;
   std::filesystem::path real = std::filesystem::weakly_canonical(path, failed);
   return failed ? path : real;
 }
 
-// Absolute, without "." and "..", links as they are.
+// Absolute path without "." and ".."; links stay.
 inline std::filesystem::path AbsolutePath(const std::filesystem::path& path) {
   std::error_code failed;
   const std::filesystem::path absolute = std::filesystem::absolute(path, failed);

@@ -9,14 +9,14 @@
 
 namespace anchorsplat {
 
-// FNV-1a of 64 bits over the bytes of arrays: the same number in every run and on every machine of the same byte order,
-// unlike std::hash. It tells whether two things are the same where nobody means harm, and no more.
+// 64-bit FNV-1a over the bytes of arrays. Unlike std::hash it is the same in every run and on every machine of the same
+// byte order. Detects change, not tampering.
 class Fingerprint {
  public:
-  // A seed gives another number for the same bytes; 0 is FNV-1a itself.
+  // Each seed gives another hash; 0 is plain FNV-1a.
   explicit Fingerprint(uint64_t seed = 0) : value_(0xcbf29ce484222325u ^ seed) {}
 
-  // Any contiguous range of plain values.
+  // Adds the bytes of a contiguous range of trivially copyable values.
   template <typename Values>
   void Add(const Values& values) {
     const auto* bytes = reinterpret_cast<const unsigned char*>(values.data());
@@ -24,7 +24,7 @@ class Fingerprint {
     for (size_t i = 0; i < count; ++i) value_ = (value_ ^ bytes[i]) * 0x100000001b3u;
   }
 
-  // The same by words of 32 bits instead of bytes, four times as quick: another number.
+  // Adds 32-bit words instead of bytes: four times as fast, a different hash.
   void AddWords(std::span<const float> values) {
     for (const float value : values) value_ = (value_ ^ std::bit_cast<uint32_t>(value)) * 0x100000001b3u;
   }

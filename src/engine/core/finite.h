@@ -20,7 +20,7 @@ bool AllFinite(const Values& values) {
 
 inline float FiniteOr(float value, float otherwise) { return std::isfinite(value) ? value : otherwise; }
 
-// Brought into 0–1; `otherwise` for what is not finite.
+// Clamped to 0–1; `otherwise` if not finite.
 inline float UnitOr(float value, float otherwise) {
   return std::isfinite(value) ? std::clamp(value, 0.0f, 1.0f) : otherwise;
 }

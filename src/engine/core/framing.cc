@@ -15,24 +15,24 @@ namespace anchorsplat {
 
 namespace {
 constexpr float kVisibleLogit = -2.2f;  // opacity 10 %: haze around an object should not move the camera
-// Of larger clouds every so many Gaussians are looked at: quantiles of half a million are off by a thousandth of the
-// Gaussians at most.
+// Larger clouds are subsampled: quantiles of half a million are off by at most a thousandth of the Gaussians.
 constexpr int64_t kMostLookedAt = 1'000'000;
 
 constexpr float kAnyLogit = -std::numeric_limits<float>::infinity();
-constexpr float kLeastLogSize = -170;  // of two axes: points and needles have a size, too
+constexpr float kLeastLogSize = -170;  // of two axes; gives points and needles a size
 
-int64_t StepOf(int64_t gaussians) { return std::max<int64_t>(1, (gaussians + kMostLookedAt - 1) / kMostLookedAt); }
+int64_t Stride(int64_t gaussians) { return std::max<int64_t>(1, (gaussians + kMostLookedAt - 1) / kMostLookedAt); }
 
-// ---- what a picture is of
+// ---- finding the subject
 
-constexpr size_t kFewest = 64;  // Gaussians: of fewer all count
+constexpr size_t kFewest = 64;  // Gaussians; of fewer, all count
 constexpr size_t kMostSearched = 10'000;
 constexpr size_t kNeighbours = 8;
-// Farther from their neighbours than usual by this, in world units and in their own size.
+// Gaussians are floaters if farther from their neighbours than usual by this factor, in world units and relative to
+// their own size.
 constexpr double kLonely = 5;
-constexpr double kGap = 3;        // between distances from the middle a hundredth of the Gaussians apart
-constexpr double kBeyondGap = 4;  // of half of what lies beyond, to the distance at which the gap begins
+constexpr double kGap = 3;        // ratio of distances from the middle, a hundredth of the Gaussians apart
+constexpr double kBeyondGap = 4;  // ratio of the median distance beyond the gap to where the gap begins
 constexpr double kFewDirections = 0.35;
 constexpr double kWorthIt = 0.5;
 
@@ -52,7 +52,7 @@ std::array<double, 3> MedianOf(const Buffer<float>& means, const Rows& rows) {
   return middle;
 }
 
-// Without floaters: surfaces are tiled by Gaussians as large as they are apart, floaters have nothing around them.
+// Drops floaters: Gaussians on a surface are about as large as their spacing, floaters are isolated.
 Rows WithoutLonely(const Buffer<float>& means, const Buffer<float>& log_sizes, const Rows& rows) {
   Buffer<float> points;
   points.reserve(3 * rows.size());
@@ -81,8 +81,8 @@ Rows WithoutLonely(const Buffer<float>& means, const Buffer<float>& log_sizes, c
   return kept;
 }
 
-// Whether what lies at `rows` is seen from `middle` in few directions, as other objects are and skies are not: of the
-// 96 parts of a cube's faces, to as many as so many points would hit that lie all around.
+// Whether `rows`, seen from `middle`, occupy few directions, as another object does and a sky does not: they hit few of
+// the 96 cells of a cube's faces, compared with equally many points all around.
 bool InFewDirections(const Buffer<float>& means, std::span<const uint32_t> rows, const std::array<double, 3>& middle) {
   constexpr int kSide = 4, kParts = 6 * kSide * kSide;
   std::array<bool, kParts> seen{};
@@ -102,21 +102,21 @@ bool InFewDirections(const Buffer<float>& means, std::span<const uint32_t> rows,
   return static_cast<double>(std::ranges::count(seen, true)) < kFewDirections * all_around;
 }
 
-// Without what lies beyond a gap, the outermost first.
+// Drops what lies beyond a gap, outermost first.
 Rows WithinGaps(const Buffer<float>& means, Rows rows) {
   while (rows.size() >= kFewest) {
     const std::array<double, 3> middle = MedianOf(means, rows);
     std::ranges::sort(rows, {}, [&](uint32_t row) { return std::pair(Distance(means.data() + 3 * row, middle), row); });
     const auto distance = [&](size_t k) { return Distance(means.data() + 3 * rows[k], middle); };
     const size_t window = std::max<size_t>(1, rows.size() / 100), half = rows.size() / 2;
-    size_t begin = rows.size() - window;  // one behind the place that is looked at
+    size_t begin = rows.size() - window;  // one past the examined index
     while (begin > half && !(distance(begin - 1 + window) >= kGap * distance(begin - 1))) --begin;
     if (begin == half) return rows;
     // The widest step of the window.
     size_t end = begin;
     double widest = 0;
     for (size_t k = begin; k < begin + window; ++k) {
-      const double step = distance(k) / distance(k - 1);  // infinite from a middle of many
+      const double step = distance(k) / distance(k - 1);  // infinite if many coincide with the middle
       if (step > widest) {
         widest = step;
         end = k;
@@ -129,7 +129,7 @@ Rows WithinGaps(const Buffer<float>& means, Rows rows) {
   return rows;
 }
 
-// Of the Gaussians at `rows`.
+// Framing of the Gaussians at `rows`.
 Framing FrameRows(const Buffer<float>& means, const Rows& rows, double reach) {
   Framing framing;
   if (rows.empty()) return framing;
@@ -166,7 +166,7 @@ Framing FrameMeans(const CloudView& cloud) {
     rows.log_scales = cloud.log_scales.subspan(3 * begin, 3 * count);
     rows.quats = cloud.quats.subspan(4 * begin, 4 * count);
     rows.opacity_logits = cloud.opacity_logits.subspan(begin, count);
-    study.Look(first, rows);
+    study.Visit(first, rows);
   });
   return study.Find();
 }
@@ -182,14 +182,14 @@ Framing FrameCloud(const CloudView& cloud) {
   return framing;
 }
 
-FramingStudy::FramingStudy(int64_t gaussians) : step_(StepOf(gaussians)) {
+FramingStudy::FramingStudy(int64_t gaussians) : step_(Stride(gaussians)) {
   const auto looked_at = static_cast<size_t>((gaussians + step_ - 1) / step_);
   means_.resize(3 * looked_at);
   opacity_logits_.resize(looked_at);
   log_sizes_.resize(looked_at);
 }
 
-void FramingStudy::Look(int64_t first, const CloudView& rows) {
+void FramingStudy::Visit(int64_t first, const CloudView& rows) {
   const int64_t next = (first + step_ - 1) / step_ * step_;
   for (int64_t i = next; i < first + rows.size(); i += step_) {
     const auto row = static_cast<size_t>(i - first), to = static_cast<size_t>(i / step_);
@@ -199,7 +199,7 @@ void FramingStudy::Look(int64_t first, const CloudView& rows) {
     const float* s = rows.log_scales.data() + 3 * row;
     log_sizes_[to] = 0.5f * std::max({s[0] + s[1], s[0] + s[2], s[1] + s[2], kLeastLogSize});
   }
-  // Of all rows only what is longest matters; exponentials are for few.
+  // Of all rows only the longest matters, which saves exponentials.
   float any = kAnyLogit, visible = kAnyLogit;
   double reach = 0, visible_reach = 0;
   for (size_t k = 0; k < rows.log_scales.size(); ++k) {
@@ -230,7 +230,7 @@ Framing FramingStudy::Find() const {
   };
   Rows rows = collect(kVisibleLogit);
   double reach = visible_reach_;
-  if (rows.empty()) {  // a cloud of haze only is framed whole
+  if (rows.empty()) {  // haze only: frame all of it
     rows = collect(kAnyLogit);
     reach = reach_;
   }
@@ -239,7 +239,7 @@ Framing FramingStudy::Find() const {
   const size_t step = (rows.size() + kMostSearched - 1) / kMostSearched;
   Rows some;
   for (size_t k = 0; k < rows.size(); k += step) some.push_back(rows[k]);
-  // Where half of them already need so much room, nothing is to be gained.
+  // If half of them already need this much room, nothing can be gained.
   const std::array<double, 3> middle = MedianOf(means_, some);
   Buffer<float> distances;
   for (const uint32_t row : some) {

@@ -10,42 +10,43 @@
 
 namespace anchorsplat {
 
-// Where to look from when nobody says: the centre of the box that holds the middle 98 % of the visible Gaussians'
-// means along each axis (of more than a million, of every so many), and the radius of the sphere around that centre
-// that holds 98 % of them. Where that is a point, the radius is what its largest Gaussian shows (3 σ); 1 where that has
-// no extent either. Gaussians that nobody draws do not count.
+// The default view target. Its centre is that of the box around the middle 98 % per axis of the visible Gaussians'
+// means (a regular subset above a million); `radius` is that of the sphere around it that holds 98 % of them. If all
+// means coincide, the radius is 3 σ of the largest Gaussian, or 1 if that has no extent. Gaussians that are not drawn
+// do not count.
 //
-// Floaters and skies would make everything else small. So Gaussians without neighbours as near as their size lets one
-// expect do not count, nor does what lies beyond a wide gap in most directions, if the radius becomes less than half of
-// what it would be with them. What lies beyond a gap in a few directions alone is another object, and stays.
+// Floaters and skies would make everything else small. Gaussians much farther from their neighbours than their size
+// suggests, and those beyond a wide gap in most directions, are therefore left out if that at least halves the radius.
+// What lies beyond a gap in only a few directions is another object and stays.
 struct Framing {
   std::array<double, 3> target = {0, 0, 0};  // world
   double radius = 1;                         // world; always positive
-  std::array<double, 3> half = {0, 0, 0};    // world; half the lengths of the box
+  std::array<double, 3> half = {0, 0, 0};    // world; half the box's side lengths
 };
 Framing FrameCloud(const CloudView& cloud);
-// The same with the target from the cloud's origin on, as means are.
+// The same with the target relative to the cloud's origin, as means are.
 Framing FrameMeans(const CloudView& cloud);
 
-// Whether a mean (x y z, finite) lies more than ten radii away: sky, floaters, strays. Both from the same origin on.
+// Whether a mean (x y z, finite) lies more than ten radii from the target: sky, floaters, strays. Both relative to the
+// same origin.
 bool IsFarOut(const Framing& framing, const float* mean);
 
-// The same of a splat that is shown block by block, or of a part of its Gaussians, numbered without gaps.
+// FrameMeans for a splat that arrives block by block, or for a subset of its Gaussians, numbered consecutively.
 class FramingStudy {
  public:
   explicit FramingStudy(int64_t gaussians);
-  void Look(int64_t first, const CloudView& rows);  // Gaussians from number `first` on; from several threads
-  Framing Find() const;                             // once all were shown; the target from their origin on
+  void Visit(int64_t first, const CloudView& rows);  // row 0 is Gaussian `first`; thread-safe
+  Framing Find() const;                              // after all Visit calls; target relative to their origin
 
  private:
   int64_t step_;
-  Buffer<float> means_, opacity_logits_;  // of every step-th: [M,3], [M]; a logit of NaN: not usable
-  Buffer<float> log_sizes_;               // [M] of the two longest axes, middle
+  Buffer<float> means_, opacity_logits_;  // of every step_-th: [M,3], [M]; logit NaN: not usable
+  Buffer<float> log_sizes_;               // [M] mean of the two largest log-scales
   std::mutex mutex_;
-  double reach_ = 0, visible_reach_ = 0;  // 3 σ of the largest Gaussian, of those that are visible
+  double reach_ = 0, visible_reach_ = 0;  // 3 σ of the largest Gaussian, and of the largest visible one
 };
 
-// Distance from which a sphere of `radius` fills the smaller side of the image, with a tenth to spare.
+// Distance at which a sphere of the framing's radius fills the smaller image side with a margin of a tenth.
 double FramingDistance(const Framing& framing, const Pinhole& intrinsics);
 
 }  // namespace anchorsplat

@@ -53,7 +53,7 @@ Status Append(GaussianCloud& cloud, const GaussianCloud& more) {
   AppendRows(cloud.means, more.means);
   if (more.origin != cloud.origin) {
     for (int64_t i = first; i < std::ssize(cloud.means); i += 3) {
-      const std::array<double, 3> at = FromOrigin(ToWorld(cloud.means.data() + i, more.origin), cloud.origin);
+      const std::array<double, 3> at = RelativeToOrigin(ToWorld(cloud.means.data() + i, more.origin), cloud.origin);
       std::ranges::transform(at, cloud.means.data() + i, [](double x) { return static_cast<float>(x); });
     }
   }
@@ -83,7 +83,7 @@ template <typename Cloud>
 bool ShapeIsUsable(const Cloud& cloud, int64_t i) {
   const float* scales = cloud.log_scales.data() + 3 * i;
   return AllFinite(cloud.means.data() + 3 * i, 3) &&
-         std::all_of(scales, scales + 3, [](float x) { return x <= kLargestLogScale; }) &&  // false for NaN
+         std::all_of(scales, scales + 3, [](float x) { return x <= kMaxLogScale; }) &&  // false for NaN
          AllFinite(cloud.quats.data() + 4 * i, 4) && !std::isnan(cloud.opacity_logits[static_cast<size_t>(i)]);
 }
 
@@ -98,7 +98,7 @@ bool HasUsableShape(const CloudView& cloud, int64_t i) { return ShapeIsUsable(cl
 bool IsUsable(const CloudView& cloud, int64_t i) { return ShapeIsUsable(cloud, i) && HarmonicsAreFinite(cloud, i); }
 bool IsUsable(const GaussianCloud& cloud, int64_t i) { return ShapeIsUsable(cloud, i) && HarmonicsAreFinite(cloud, i); }
 
-bool IsOpaqueEnough(float logit) { return Sigmoid(logit) >= kLeastOpacity; }
+bool IsOpaqueEnough(float logit) { return Sigmoid(logit) >= kMinOpacity; }
 bool IsDrawn(const CloudView& cloud, int64_t i) {
   return IsOpaqueEnough(cloud.opacity_logits[static_cast<size_t>(i)]) && IsUsable(cloud, i);
 }

@@ -5,7 +5,7 @@
 
 namespace anchorsplat {
 
-// Floats of 16 bits as floats of 32, exact for all of their values.
+// Exact conversions of 16-bit floats to float.
 
 // IEEE 754 half precision.
 inline float FloatFromHalf(uint16_t bits) {
@@ -19,7 +19,7 @@ inline float FloatFromHalf(uint16_t bits) {
   return std::bit_cast<float>(sign | ((rest << 13) + ((127u - 15u) << 23)));
 }
 
-// The upper half of a float.
+// bfloat16: the upper 16 bits of a float.
 inline float FloatFromBFloat16(uint16_t bits) { return std::bit_cast<float>(static_cast<uint32_t>(bits) << 16); }
 
 }  // namespace anchorsplat

@@ -7,13 +7,13 @@
 
 namespace anchorsplat {
 
-// No picture or view is larger, so that a file or a flag of a few bytes cannot make us allocate more than a few GB; and
-// pixel coordinates and their squares stay exact enough in float.
+// Largest picture or view. Bounds allocations that a small file or flag can cause to a few GB, and keeps pixel
+// coordinates and their squares accurate in float.
 inline constexpr int kMaxImageSide = 1 << 19;
 inline constexpr int64_t kMaxImagePixels = int64_t{1} << 28;
 
-// Planar float picture: pixels[(c·height + y)·width + x]. Colours are 0–1 as in the file (value/255, no colour-space
-// conversion), not premultiplied; channel order r g b [a]; one channel for depth or alpha alone.
+// Planar float image: pixels[(c·height + y)·width + x]. Colours are 0–1 as in the file (value/255, no colour-space
+// conversion), not premultiplied. Channels are r g b [a], or one for depth or alpha alone.
 struct Image {
   int width = 0;
   int height = 0;
@@ -34,7 +34,7 @@ struct Image {
   float at(int c, int y, int x) const { return pixels[static_cast<size_t>((int64_t{c} * height + y) * width + x)]; }
 };
 
-// Pixels [x0, x1) × [y0, y1); empty where x0 ≥ x1 or y0 ≥ y1.
+// Pixels [x0, x1) × [y0, y1); empty if x0 ≥ x1 or y0 ≥ y1.
 struct PixelBox {
   int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
 
@@ -42,7 +42,7 @@ struct PixelBox {
   friend bool operator==(const PixelBox&, const PixelBox&) = default;
 };
 
-// The part of a picture in `box`, which lies within it. Memory of `out` is used again where the shape is the same.
+// Copies the part of `image` inside `box`, which must lie within it. Reuses the memory of `out` if the shape matches.
 inline void CropInto(const Image& image, const PixelBox& box, Image& out) {
   const int width = box.x1 - box.x0, height = box.y1 - box.y0;
   if (out.width != width || out.height != height || out.channels != image.channels) {

@@ -1,10 +1,9 @@
 #pragma once
 
-// ANCHORSPLAT_INCLUDE_BYTES(NAME, PATH): a file as constants of the program, from the symbol NAME up to NAME_end, which
-// the source declares as extern "C" const std::byte[]. The assembler copies it: both compilers know this, C++20 has
-// nothing for it.
+// ANCHORSPLAT_INCLUDE_BYTES(NAME, PATH) embeds a file as the bytes from symbol NAME up to NAME_end, to be declared as
+// extern "C" const std::byte[]. Uses the assembler's .incbin, which GCC and Clang support; C++20 has no equivalent.
 #ifdef __wasm__
-// Of WebAssembly: every section is a segment of its own, and a symbol of data says its size.
+// WebAssembly: each section is its own segment, and data symbols need a size.
 #define ANCHORSPLAT_INCLUDE_BYTES(NAME, PATH) \
   asm(".section .rodata." NAME                \
       ",\"\",@\n"                             \

@@ -12,9 +12,9 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int64_t kLeaf = 8;  // points: fewer are searched faster than divided
+constexpr int64_t kLeaf = 8;  // points; splitting fewer does not pay
 constexpr int64_t kParallelRange = 1 << 15;
-constexpr size_t kInOrder = 96;  // neighbours up to which it is quicker to keep them in order
+constexpr size_t kInOrder = 96;  // up to this many neighbours a sorted list is faster
 
 double SquaredDistance(const std::array<float, 3>& a, const std::array<double, 3>& b) {
   double sum = 0;
@@ -67,7 +67,7 @@ void KdTree::Build(int64_t begin, int64_t end) {
   end - begin > kParallelRange ? ParallelFor(0, 2, 1, build) : build(0, 2);
 }
 
-// The few nearest so far in order: what is new moves the others up.
+// Small result set, kept sorted by insertion.
 class KdTree::Few {
  public:
   explicit Few(std::span<Neighbour> nearest) : nearest_(nearest) {
@@ -82,10 +82,10 @@ class KdTree::Few {
   void Finish() {}
 
  private:
-  std::span<Neighbour> nearest_;  // rising distances, infinite where nothing was found yet
+  std::span<Neighbour> nearest_;  // increasing distances, infinite if unused
 };
 
-// Of many, twice as many are gathered before the farther half is dropped: a constant time for each, however many.
+// Large result set: collects twice as many, then drops the farther half, at constant cost per point.
 class KdTree::Many {
  public:
   explicit Many(std::span<Neighbour> nearest) : nearest_(nearest) { pile_.reserve(2 * nearest.size()); }
@@ -123,7 +123,7 @@ struct KdTree::Search {
   std::array<double, 3> point;
   Found nearest;
 
-  void Look(int64_t place) {
+  void Visit(int64_t place) {
     if (place == self) return;
     const double distance = SquaredDistance(tree.points_[static_cast<size_t>(place)].position, point);
     if (distance < nearest.farthest()) nearest.Add(distance, place);
@@ -131,13 +131,13 @@ struct KdTree::Search {
 
   void Range(int64_t begin, int64_t end) {
     if (end - begin <= kLeaf) {
-      for (int64_t place = begin; place < end; ++place) Look(place);
+      for (int64_t place = begin; place < end; ++place) Visit(place);
       return;
     }
     const int64_t middle = (begin + end) / 2;
     const size_t axis = tree.axis_[static_cast<size_t>(middle)];
     const double side = point[axis] - double{tree.points_[static_cast<size_t>(middle)].position[axis]};
-    Look(middle);
+    Visit(middle);
     side < 0 ? Range(begin, middle) : Range(middle + 1, end);
     // At equality no closer point can be on the other side.
     if (side * side < nearest.farthest()) side < 0 ? Range(middle + 1, end) : Range(begin, middle);

@@ -14,9 +14,9 @@ double Denominator(const Lens& lens, double q) {
   return 1 + q * (lens.denominator[0] + q * (lens.denominator[1] + q * lens.denominator[2]));
 }
 
-// How far from the middle a point at radius r is drawn, tangential terms left out.
-double Drawn(const Lens& lens, double r) {
-  if (lens.model == LensModel::kStraight) return r;
+// Distorted radius of a point at radius r, without tangential terms.
+double DistortedRadius(const Lens& lens, double r) {
+  if (lens.model == LensModel::kNone) return r;
   if (lens.model == LensModel::kFisheye) {
     const double theta = std::atan(r);
     return theta * Power4(lens.radial, theta * theta);
@@ -24,32 +24,32 @@ double Drawn(const Lens& lens, double r) {
   return r * Power4(lens.radial, r * r) / Denominator(lens, r * r);
 }
 
-// Angles from the axis that are looked at, up to what no pinhole's picture needs.
+// Angles from the axis that are searched; no pinhole picture needs larger ones.
 constexpr int kAngles = 8192;
 constexpr double kWidest = 0.4999 * std::numbers::pi;
 
 }  // namespace
 
-bool Lens::IsStraight() const {
+bool Lens::IsIdentity() const {
   if (model == LensModel::kFisheye) return false;
   const auto zero = [](const auto& list) {
     return std::all_of(list.begin(), list.end(), [](double x) { return x == 0; });
   };
-  return model == LensModel::kStraight || (zero(radial) && zero(denominator) && zero(tangential) && skew == 0);
+  return model == LensModel::kNone || (zero(radial) && zero(denominator) && zero(tangential) && skew == 0);
 }
 
 namespace {
 
-// Without the skew.
-PlanePoint Bend(const Lens& lens, const PlanePoint& p) {
+// Distort without skew.
+PlanePoint DistortUnskewed(const Lens& lens, const PlanePoint& p) {
   const double x = p[0], y = p[1], q = x * x + y * y;
   switch (lens.model) {
-    case LensModel::kStraight:
+    case LensModel::kNone:
       break;
     case LensModel::kFisheye: {
       const double r = std::sqrt(q);
       if (r < 1e-12) break;
-      const double s = Drawn(lens, r) / r;
+      const double s = DistortedRadius(lens, r) / r;
       return {s * x, s * y};
     }
     case LensModel::kRadial: {
@@ -64,46 +64,46 @@ PlanePoint Bend(const Lens& lens, const PlanePoint& p) {
 }  // namespace
 
 PlanePoint Distort(const Lens& lens, const PlanePoint& p) {
-  const PlanePoint bent = Bend(lens, p);
-  return {bent[0] + lens.skew * bent[1], bent[1]};
+  const PlanePoint d = DistortUnskewed(lens, p);
+  return {d[0] + lens.skew * d[1], d[1]};
 }
 
-LensInverse::LensInverse(const Lens& lens) : lens_(lens), largest_radius_(0), largest_drawn_(0) {
+LensInverse::LensInverse(const Lens& lens) : lens_(lens), largest_radius_(0), largest_distorted_(0) {
   for (int i = 1; i <= kAngles; ++i) {
     const double r = std::tan(kWidest * i / kAngles);
-    const double drawn = Drawn(lens, r);
-    if (!(drawn > largest_drawn_)) break;
+    const double distorted = DistortedRadius(lens, r);
+    if (!(distorted > largest_distorted_)) break;
     if (lens.model == LensModel::kRadial && !(Denominator(lens, r * r) > 0)) break;
     largest_radius_ = r;
-    largest_drawn_ = drawn;
+    largest_distorted_ = distorted;
   }
 }
 
-std::optional<PlanePoint> LensInverse::Undistort(const PlanePoint& place) const {
-  if (lens_.IsStraight()) return place;
-  const PlanePoint distorted = {place[0] - lens_.skew * place[1], place[1]};
-  const double drawn = std::hypot(distorted[0], distorted[1]);
-  if (!(drawn < 1e300)) return std::nullopt;
-  if (drawn < 1e-12) return distorted;
-  // The radial part increases up to the largest radius: halving cannot fail. Tangential terms may be needed to get
-  // back inside of it.
+std::optional<PlanePoint> LensInverse::Undistort(const PlanePoint& distorted) const {
+  if (lens_.IsIdentity()) return distorted;
+  const PlanePoint unskewed = {distorted[0] - lens_.skew * distorted[1], distorted[1]};
+  const double radius = std::hypot(unskewed[0], unskewed[1]);
+  if (!(radius < 1e300)) return std::nullopt;
+  if (radius < 1e-12) return unskewed;
+  // The radial part is monotonic up to the largest radius, so bisection cannot fail. Tangential terms may be needed to
+  // get back inside.
   double low = 0, high = largest_radius_;
   for (int i = 0; i < 60 && high - low > 1e-4 * high; ++i) {
     const double middle = 0.5 * (low + high);
-    (Drawn(lens_, middle) < drawn ? low : high) = middle;
+    (DistortedRadius(lens_, middle) < radius ? low : high) = middle;
   }
   const double r = 0.5 * (low + high);
-  PlanePoint p = {distorted[0] / drawn * r, distorted[1] / drawn * r};
-  if (lens_.model == LensModel::kFisheye && drawn > largest_drawn_) return std::nullopt;
-  // Newton's method with differences, for the last digits and for tangential terms.
+  PlanePoint p = {unskewed[0] / radius * r, unskewed[1] / radius * r};
+  if (lens_.model == LensModel::kFisheye && radius > largest_distorted_) return std::nullopt;
+  // Newton's method with finite differences adds the last digits and the tangential terms.
   constexpr double kStep = 1e-7;
   for (int i = 0; i < 30; ++i) {
-    const PlanePoint f = Bend(lens_, p);
-    const double ex = f[0] - distorted[0], ey = f[1] - distorted[1];
-    if (std::hypot(ex, ey) < 1e-13 * (1 + drawn)) break;
+    const PlanePoint f = DistortUnskewed(lens_, p);
+    const double ex = f[0] - unskewed[0], ey = f[1] - unskewed[1];
+    if (std::hypot(ex, ey) < 1e-13 * (1 + radius)) break;
     const double h = kStep * (1 + std::hypot(p[0], p[1]));
-    const PlanePoint right = Bend(lens_, {p[0] + h, p[1]}), left = Bend(lens_, {p[0] - h, p[1]});
-    const PlanePoint below = Bend(lens_, {p[0], p[1] + h}), above = Bend(lens_, {p[0], p[1] - h});
+    const PlanePoint right = DistortUnskewed(lens_, {p[0] + h, p[1]}), left = DistortUnskewed(lens_, {p[0] - h, p[1]});
+    const PlanePoint below = DistortUnskewed(lens_, {p[0], p[1] + h}), above = DistortUnskewed(lens_, {p[0], p[1] - h});
     const double a = (right[0] - left[0]) / (2 * h), b = (below[0] - above[0]) / (2 * h);
     const double c = (right[1] - left[1]) / (2 * h), d = (below[1] - above[1]) / (2 * h);
     const double determinant = a * d - b * c;
@@ -111,9 +111,9 @@ std::optional<PlanePoint> LensInverse::Undistort(const PlanePoint& place) const 
     p[0] -= (d * ex - b * ey) / determinant;
     p[1] -= (a * ey - c * ex) / determinant;
   }
-  const PlanePoint found = Bend(lens_, p);
-  const double off = std::hypot(found[0] - distorted[0], found[1] - distorted[1]);
-  if (!(off < 1e-8 * (1 + drawn)) || !(std::hypot(p[0], p[1]) <= largest_radius_ * (1 + 1e-6))) return std::nullopt;
+  const PlanePoint found = DistortUnskewed(lens_, p);
+  const double off = std::hypot(found[0] - unskewed[0], found[1] - unskewed[1]);
+  if (!(off < 1e-8 * (1 + radius)) || !(std::hypot(p[0], p[1]) <= largest_radius_ * (1 + 1e-6))) return std::nullopt;
   return p;
 }
 

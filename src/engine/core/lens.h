@@ -5,48 +5,47 @@
 
 namespace anchorsplat {
 
-// How a lens bends a pinhole's picture, of points of the plane at depth 1: (x/z, y/z), OpenCV axes. With r² = x² + y²
-// and θ = atan r:
+// Lens distortion of a point (x, y) = (X/Z, Y/Z) on the plane at depth 1, OpenCV axes. With r² = x² + y², θ = atan r:
 //
 //   kRadial   s = (1 + k1·r² + k2·r⁴ + k3·r⁶ + k4·r⁸) / (1 + d1·r² + d2·r⁴ + d3·r⁶)
 //             x' = s·x + 2·p1·x·y + p2·(r² + 2x²),  y' = s·y + 2·p2·x·y + p1·(r² + 2y²)       (Brown 1971, OpenCV)
 //   kFisheye  θ' = θ·(1 + k1·θ² + k2·θ⁴ + k3·θ⁶ + k4·θ⁸),  (x', y') = θ'/r · (x, y)            (OpenCV's fisheye)
 //
-// (x' + skew·y', y') times the focal lengths, plus the principal point, is the place in the picture.
-enum class LensModel { kStraight, kRadial, kFisheye };
+// Pixel position = (x' + skew·y', y') · focal lengths + principal point.
+enum class LensModel { kNone, kRadial, kFisheye };
 struct Lens {
-  LensModel model = LensModel::kStraight;
+  LensModel model = LensModel::kNone;
   std::array<double, 4> radial = {0, 0, 0, 0};    // k1 … k4
-  std::array<double, 3> denominator = {0, 0, 0};  // d1 … d3, which FULL_OPENCV calls k4, k5, k6
+  std::array<double, 3> denominator = {0, 0, 0};  // d1 … d3; COLMAP's FULL_OPENCV calls them k4, k5, k6
   std::array<double, 2> tangential = {0, 0};      // p1, p2
-  double skew = 0;                                // of rows against columns, in horizontal focal lengths
+  double skew = 0;                                // shear of rows against columns, in units of fx
 
-  // Draws what a pinhole does: no model, or a radial one of zeros. A fisheye of zeros is not straight.
-  bool IsStraight() const;
+  // Whether the lens distorts nothing: no model, or a radial one with all zeros. A fisheye of zeros still distorts.
+  bool IsIdentity() const;
   friend bool operator==(const Lens&, const Lens&) = default;
 };
 
 using PlanePoint = std::array<double, 2>;
 
-PlanePoint Distort(const Lens& lens, const PlanePoint& straight);
+PlanePoint Distort(const Lens& lens, const PlanePoint& undistorted);
 
-// The other way, for many points of one lens.
+// Inverse of Distort, for many points of one lens.
 class LensInverse {
  public:
   explicit LensInverse(const Lens& lens);
 
-  // Nothing where the lens draws no point of the plane: behind 90 degrees of a fisheye, or farther out than the model
-  // goes before it folds back.
+  // The undistorted point. None if the lens maps no point there: a fisheye at 90° or more, or a radius beyond the
+  // model's fold-back (largest_radius).
   std::optional<PlanePoint> Undistort(const PlanePoint& distorted) const;
 
-  // The radius r up to which a point farther out is drawn farther out; beyond it a polynomial that was fitted to what
-  // the picture shows says nothing about the world, and folds over it.
+  // Largest r up to which distortion is monotonic. A polynomial fitted to the picture is meaningless beyond it and
+  // folds back over the picture.
   double largest_radius() const { return largest_radius_; }
 
  private:
   Lens lens_;
   double largest_radius_;
-  double largest_drawn_;  // of the radius above
+  double largest_distorted_;  // distorted largest_radius_
 };
 
 }  // namespace anchorsplat

@@ -46,7 +46,7 @@ TEST(Lens, KnownPoints) {
   skewed.skew = 0.5;
   EXPECT_NEAR(Distort(skewed, {1, 2})[0], d[0] + 0.5 * d[1], 1e-12);
   EXPECT_EQ(Distort(skewed, {1, 2})[1], d[1]);
-  EXPECT_FALSE((Lens{.model = LensModel::kRadial, .skew = 1e-9}.IsStraight()));
+  EXPECT_FALSE((Lens{.model = LensModel::kRadial, .skew = 1e-9}.IsIdentity()));
   const PlanePoint f = Distort({.model = LensModel::kFisheye, .radial = {0.1, 0, 0, 0}}, {0, 1});
   EXPECT_NEAR(f[1], M_PI / 4 * (1 + 0.1 * M_PI * M_PI / 16), 1e-12);
   EXPECT_NEAR(f[0], 0, 1e-15);
@@ -66,8 +66,8 @@ TEST(Lens, NothingIsFoundWhereTheModelFoldsBack) {
   }
   const LensInverse none({.model = LensModel::kRadial, .radial = {-1e30, 0, 0, 0}});
   EXPECT_FALSE(none.Undistort({0.1, 0.1}).has_value());
-  EXPECT_TRUE(Lens{}.IsStraight());
-  EXPECT_FALSE((Lens{.model = LensModel::kFisheye}).IsStraight());
+  EXPECT_TRUE(Lens{}.IsIdentity());
+  EXPECT_FALSE((Lens{.model = LensModel::kFisheye}).IsIdentity());
 }
 
 }  // namespace

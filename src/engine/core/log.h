@@ -10,24 +10,25 @@ namespace internal {
 struct Run;
 }
 
-// Everything the program says while it works is an *event*; a sink decides what becomes of it. Bars, --quiet, --json
-// and tests all read the same events. No other code writes to stderr. Strings only, so that no formatting library
-// reaches our headers (LibTorch carries its own fmt).
+// Messages and progress are *events*; a sink decides how to show them. Bars, --quiet, --json and tests read the same
+// events, and no other code writes to stderr. Events are plain strings, so that no formatting library reaches our
+// headers (LibTorch brings its own fmt).
 enum class LogLevel { kInfo, kWarning, kError };
 
 class LogSink {
  public:
   virtual ~LogSink() = default;
   virtual void Message(LogLevel level, const std::string& text) = 0;
-  // A task of `total` steps begins (0 = unknown), advances to `done` with a short note, ends. One at a time in a run.
+  // Start, progress and end of a task. `total` = number of steps, 0 if unknown; `note` is a short text. One task at a
+  // time per run.
   virtual void TaskBegin(const std::string& name, int64_t total) = 0;
   virtual void TaskProgress(int64_t done, const std::string& note) = 0;
   virtual void TaskEnd() = 0;
 };
 
-// Replaces the sink of the process and returns the one before; a run may have its own (core/run_context.h). The first
-// one prints messages to stderr, bars only when stderr is a terminal. Events may come from any thread: they are
-// serialised before they reach the sink.
+// Sets the sink of the process and returns the previous one; a run can have its own (core/run_context.h). The default
+// sink prints messages to stderr, and bars only if stderr is a terminal. Events may come from any thread; the sink gets
+// them one at a time.
 std::shared_ptr<LogSink> SetLogSink(std::shared_ptr<LogSink> sink);
 std::shared_ptr<LogSink> MakeTerminalSink(bool quiet);  // quiet: warnings and errors only, no bars
 
@@ -35,7 +36,7 @@ void LogInfo(const std::string& text);
 void LogWarning(const std::string& text);
 void LogError(const std::string& text);
 
-// A task for as long as the object lives. Advance() may be called from any thread and at any rate.
+// A task that lasts as long as this object. Advance() is thread-safe and cheap enough to call often.
 class Progress {
  public:
   Progress(const std::string& name, int64_t total);
@@ -45,7 +46,7 @@ class Progress {
   void Advance(int64_t steps = 1, const std::string& note = {});
 
  private:
-  std::shared_ptr<internal::Run> run_;  // that it belongs to, whoever advances it
+  std::shared_ptr<internal::Run> run_;  // the run that owns the task, whichever thread advances it
   int64_t done_ = 0;
 };
 

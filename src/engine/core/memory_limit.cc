@@ -33,16 +33,16 @@ struct LimitedBuffers {
   std::unordered_map<void*, std::size_t> mapped;
 };
 
-// Never destroyed: Buffers of static objects may be given back after all else.
+// Never destroyed: static objects may free Buffers after it.
 LimitedBuffers& BuffersNow() {
   static LimitedBuffers* const limit = new LimitedBuffers;
   return *limit;
 }
 
-// False until the first limit: then Buffers ask nobody.
+// False until the first MemoryLimit: Buffers then take the fast path.
 std::atomic<bool> ever_limited = false;
 
-// A file that nobody can find, or −1 with errno.
+// Opens an unnamed file; −1 with errno on failure.
 int OpenNameless(const std::filesystem::path& folder) {
 #ifdef O_TMPFILE
   const int descriptor = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
@@ -56,7 +56,7 @@ int OpenNameless(const std::filesystem::path& folder) {
 
 void* MapNameless(const std::filesystem::path& folder, std::size_t bytes) {
   const int descriptor = OpenNameless(folder);
-  if (descriptor < 0) throw NoDiskRoom(bytes, folder, errno);
+  if (descriptor < 0) throw DiskFull(bytes, folder, errno);
   int error;
   do {
     error = ::posix_fallocate(descriptor, 0, static_cast<off_t>(bytes));
@@ -67,11 +67,11 @@ void* MapNameless(const std::filesystem::path& folder, std::size_t bytes) {
     if (memory == MAP_FAILED) error = errno;
   }
   ::close(descriptor);  // the mapping holds the file
-  if (error != 0) throw NoDiskRoom(bytes, folder, error);
+  if (error != 0) throw DiskFull(bytes, folder, error);
   return memory;
 }
 
-// The first number of a file; nothing where there is none ("max").
+// First number in a file; the largest number if there is none ("max").
 uint64_t NumberIn(const char* path) {
   uint64_t number = 0;
   std::ifstream file(path);
@@ -80,7 +80,7 @@ uint64_t NumberIn(const char* path) {
 
 }  // namespace
 
-NoDiskRoom::NoDiskRoom(uint64_t bytes, const std::filesystem::path& folder, int error)
+DiskFull::DiskFull(uint64_t bytes, const std::filesystem::path& folder, int error)
     : message_(Cat("no room for ", HumanBytes(bytes), " of temporary files in ", folder.string(), ": ",
                    std::generic_category().message(error), " (--max-memory with more memory needs less of them)")) {}
 

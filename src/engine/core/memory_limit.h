@@ -8,32 +8,32 @@
 
 namespace anchorsplat {
 
-// Bounds the memory of Buffers of 4 MiB and more. Those for which there is no room lie in files without names in a
-// folder, mapped into the address space: nothing else in the program changes, results have the same bits, and the
-// system takes the memory of such pages back whenever somebody else needs it. The disk space is claimed when a Buffer
-// is made, so that a full disk is a NoDiskRoom and no SIGBUS later. However the process ends, nothing of the files
-// stays, as they never had names (where the file system has no such files: for a moment).
+// Limits the memory of Buffers of 4 MiB and more. Buffers beyond the limit live in unnamed temporary files, mapped into
+// the address space: results are bit-identical, and the system reclaims their pages under memory pressure. Disk space
+// is reserved on allocation, so a full disk throws DiskFull instead of raising SIGBUS later. Unnamed files vanish
+// however the process ends; file systems without them show a name for a moment.
 //
-// Process-wide and one at a time; Buffers may outlive it and stay where they are.
+// Process-wide, one at a time. Buffers may outlive the limit and stay where they are.
 class MemoryLimit {
  public:
-  // `bytes` of Buffers at once; the largest ones (64 MiB and more) get half of it, as the others are in more use.
+  // `bytes`: limit on all Buffers together. Buffers of 64 MiB and more may use half of it, as smaller ones are in
+  // heavier use. `folder`: of the temporary files.
   MemoryLimit(uint64_t bytes, std::filesystem::path folder);
   ~MemoryLimit();
   MemoryLimit(const MemoryLimit&) = delete;
   MemoryLimit& operator=(const MemoryLimit&) = delete;
 
-  // The most that lay on disk at a time since it began, in bytes.
+  // Peak bytes on disk since construction.
   uint64_t most_on_disk() const;
 };
 
-// What the system, or the control group that the process runs in, has.
+// Memory of the machine, or of the process's control group if that is less, in bytes.
 uint64_t MachineMemory();
 
-// There is no room for a Buffer on disk either.
-class NoDiskRoom : public std::bad_alloc {
+// Thrown if a temporary file cannot hold a Buffer.
+class DiskFull : public std::bad_alloc {
  public:
-  NoDiskRoom(uint64_t bytes, const std::filesystem::path& folder, int error);
+  DiskFull(uint64_t bytes, const std::filesystem::path& folder, int error);
   const char* what() const noexcept override { return message_.c_str(); }
 
  private:
@@ -44,15 +44,15 @@ namespace internal {
 
 inline constexpr std::size_t kLimitedFrom = std::size_t{4} << 20;
 
-// What AllocateBuffer and FreeBuffer ask for sizes from kLimitedFrom on.
+// Hooks of AllocateBuffer and FreeBuffer for sizes from kLimitedFrom on.
 struct LimitedPlace {
-  void* mapped = nullptr;  // null: it shall be memory
-  bool counted = false;    // which then has to be settled
+  void* mapped = nullptr;  // null: allocate memory
+  bool counted = false;    // call SettleLimited with the memory
 };
 LimitedPlace ClaimLimited(std::size_t bytes);
-// Where the memory is; null: there was none.
+// Reports the memory allocated after a counted claim; null if the allocation failed.
 void SettleLimited(void* memory, std::size_t bytes) noexcept;
-// Whether the Buffer was mapped, and is gone now.
+// Whether the Buffer was mapped; it is then unmapped.
 bool ReleaseLimited(void* memory, std::size_t bytes) noexcept;
 
 }  // namespace internal

@@ -78,7 +78,7 @@ TEST_F(MemoryLimitTest, NoRoomOnDiskIsAnErrorThatNamesTheFolder) {
   try {
     const Buffer<uint8_t> buffer(8 * kMegabyte);
     FAIL() << "made in a folder that is not there";
-  } catch (const NoDiskRoom& none) {
+  } catch (const DiskFull& none) {
     EXPECT_NE(std::string(none.what()).find((folder_ / "none").string()), std::string::npos) << none.what();
   }
   const MemoryLimit other(0, folder_);

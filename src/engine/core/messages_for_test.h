@@ -9,7 +9,7 @@
 
 namespace anchorsplat {
 
-// What is said while it lives.
+// Captures log messages while it lives.
 class Messages {
  public:
   Messages() : before_(SetLogSink(sink_)) {}

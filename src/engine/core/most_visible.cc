@@ -17,8 +17,8 @@ std::vector<int64_t> MostVisible(const GaussianCloud& cloud, std::span<const int
     }
     const float* s = cloud.log_scales.data() + 3 * rows[j];
     const float logit = cloud.opacity_logits[static_cast<size_t>(rows[j])];
-    // Without the smallest; a flat Gaussian's is −Inf, which a difference would not take off. Needles and points have
-    // more than what is not drawn at all.
+    // The sum without the smallest: subtracting it would fail for −Inf (flat Gaussians). Needles and points rank above
+    // what is not drawn.
     const float largest = std::max({s[0] + s[1], s[0] + s[2], s[1] + s[2]});
     log_weight[j] = LogSigmoid(logit) + std::max(largest, std::numeric_limits<float>::lowest());
   }

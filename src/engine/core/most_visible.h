@@ -8,10 +8,10 @@
 
 namespace anchorsplat {
 
-// The `count` of `rows` with the largest opacity × size (product of the two largest scales), in the order of `rows`; of
-// equal ones the first. Those that are not drawn (IsDrawn) come after all others.
+// The `count` of `rows` with the largest opacity × product of the two largest scales, in the order of `rows`. Ties
+// prefer the earlier row; rows that are not drawn (IsDrawn) come last.
 std::vector<int64_t> MostVisible(const GaussianCloud& cloud, std::span<const int64_t> rows, int64_t count);
-// Of all rows.
+// The same for all rows.
 std::vector<int64_t> MostVisible(const GaussianCloud& cloud, int64_t count);
 
 }  // namespace anchorsplat

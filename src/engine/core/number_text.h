@@ -5,14 +5,14 @@
 #include <type_traits>
 
 #ifndef __cpp_lib_to_chars
-// libc++ before 20 reads no floating-point numbers.
+// libc++ before 20 has no floating-point from_chars.
 #include <fast_float/fast_float.h>
 #endif
 
 namespace anchorsplat {
 
-// std::from_chars of every arithmetic type with every standard library: the same numbers to the last bit, and `value`
-// as it was where there is an error.
+// std::from_chars for every arithmetic type and standard library, with identical results; `value` is unchanged on
+// error.
 template <typename T>
 std::from_chars_result FromChars(const char* first, const char* last, T& value) {
 #ifndef __cpp_lib_to_chars

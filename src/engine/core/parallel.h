@@ -6,19 +6,19 @@
 
 namespace anchorsplat {
 
-// Threads that parallel loops may use, for the whole process; 0 = as many as the machine has (the default). Call it
-// before the first loop, from one thread. A run may have fewer (core/run_context.h).
+// Sets the number of threads for parallel loops of the process; 0 = all of the machine (the default). Call it before
+// the first loop, from one thread. A run may use fewer (core/run_context.h).
 void SetThreadCount(int threads);
-int ThreadCount();  // of the run that this thread takes part in
+int ThreadCount();  // of this thread's run
 
 namespace internal {
 using RangeFunction = void (*)(void* context, int64_t begin, int64_t end);
 void ParallelRanges(int64_t begin, int64_t end, int64_t grain, RangeFunction function, void* context);
 }  // namespace internal
 
-// Calls body(first, last) for disjoint sub-ranges that cover [begin, end), possibly at the same time. Every sub-range
-// starts at begin + k·grain and holds `grain` indices (the last may be shorter), whatever the number of threads, so a
-// body that sums per sub-range gives the same bits on every machine. Exceptions reach the caller. Loops may be nested.
+// Calls body(first, last) for disjoint sub-ranges that cover [begin, end), possibly in parallel. Sub-range k starts at
+// begin + k·grain and has `grain` indices (the last may have fewer), for any number of threads, so per-range sums give
+// the same bits on every machine. Exceptions propagate to the caller. Loops may nest.
 template <typename Body>
 void ParallelFor(int64_t begin, int64_t end, int64_t grain, Body&& body) {
   internal::ParallelRanges(

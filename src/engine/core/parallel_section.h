@@ -4,8 +4,8 @@
 
 namespace anchorsplat {
 
-// Calls what has parallel loops of its own (tbb::parallel_sort) where this thread's run has its threads
-// (core/run_context.h); core/parallel.h does that by itself.
+// Runs code with its own parallel loops (tbb::parallel_sort) on the threads of this thread's run (core/run_context.h).
+// ParallelFor does so itself.
 void ParallelSection(const std::function<void()>& section);
 
 }  // namespace anchorsplat

@@ -13,8 +13,8 @@
 
 namespace anchorsplat {
 
-// Sorts [first, last) with the threads of this thread's run. Not stable: with a total order the result is the same
-// however the work was split.
+// Sorts [first, last) on the threads of this thread's run. Not stable; with a total order the result is the same for
+// any number of threads.
 template <typename Iterator>
 void ParallelSort(Iterator first, Iterator last) {
 #ifdef ANCHORSPLAT_WORKERS

@@ -6,12 +6,12 @@
 
 namespace anchorsplat {
 
-// One T for each thread, made when the thread first asks: what a loop's body keeps from call to call. There is one for
-// each type, so who wants one of their own gives it a type of their own.
+// The calling thread's T, created on first use: scratch memory that a loop's body keeps between calls. Code that shares
+// T shares the object; use a type of your own to avoid that.
 template <typename T>
 T& PerThread() {
 #ifdef ANCHORSPLAT_WORKERS
-  // Not thread_local: where a module is linked without threads, LLVM 19's linker puts such variables over other data.
+  // Not thread_local: in modules linked without threads, LLVM 19's linker overlaps such variables with other data.
   static const pthread_key_t key = [] {
     pthread_key_t made{};
     pthread_key_create(&made, [](void* kept) { delete static_cast<T*>(kept); });

@@ -4,7 +4,7 @@
 
 namespace anchorsplat {
 
-// A small generator (splitmix64 seeding, xoshiro256**) whose numbers are the same on every platform, unlike the
+// Random generator (xoshiro256**, seeded by splitmix64) with the same numbers on every platform, unlike the
 // distributions of <random>.
 class Random {
  public:

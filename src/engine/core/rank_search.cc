@@ -54,7 +54,7 @@ RankSearch::Rank RankSearch::Find(uint64_t rank) const {
 }
 
 void RankSearch::Refine(std::span<const float> values) {
-  // Many equal numbers in a row are added at once: threads would wait for each other.
+  // Runs of equal numbers are added at once, as threads would contend for their counter.
   std::atomic<uint32_t>* at = nullptr;
   uint32_t times = 0;
   for (const float value : values) {
@@ -83,9 +83,11 @@ float RankSearch::ValueAt(const Rank& rank) const {
   return kNone;
 }
 
-float RankSearch::LeastOf(size_t k) const { return pairs_.empty() ? kNone : ValueOf(pairs_[k].low.bin << kFineBits); }
+float RankSearch::LowerBound(size_t k) const {
+  return pairs_.empty() ? kNone : ValueOf(pairs_[k].low.bin << kFineBits);
+}
 
-float RankSearch::MostOf(size_t k) const {
+float RankSearch::UpperBound(size_t k) const {
   return pairs_.empty() ? kNone : ValueOf((pairs_[k].high.bin << kFineBits) | (kFine - 1));
 }
 

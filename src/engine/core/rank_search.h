@@ -9,28 +9,28 @@
 
 namespace anchorsplat {
 
-// Quantiles of numbers of which there are too many to keep: exact, from counts. They are counted coarsely, then those
-// near the quantiles finely; memory depends on the number of quantiles alone.
+// Exact quantiles of more numbers than fit in memory, in two passes: counts in coarse bins, then in fine bins near the
+// quantiles. Memory depends only on the number of quantiles.
 class RankSearch {
  public:
   // `quantiles`: fractions, as in Quantile (core/statistics.h).
   explicit RankSearch(std::span<const double> quantiles);
 
-  // First, all numbers, by who counts them. No NaN.
+  // Pass 1: the caller counts all numbers (no NaN) by bin CoarseBin(value) and adds the counts. Not thread-safe.
   static constexpr size_t kCoarse = size_t{1} << 15;
-  static size_t CoarseOf(float value) { return KeyOf(value) >> kFineBits; }
-  void Count(std::span<const uint32_t> counts);  // [kCoarse] of some of them; not from several threads at once
+  static size_t CoarseBin(float value) { return KeyOf(value) >> kFineBits; }
+  void Count(std::span<const uint32_t> counts);  // [kCoarse]
   void EndCounting();
 
-  // Then they are shown once more. From several threads.
+  // Pass 2, after EndCounting: all numbers again. Thread-safe.
   void Refine(std::span<const float> values);
 
-  // Between these two quantile k lies for sure. After EndCounting; of no numbers: NaN.
-  float LeastOf(size_t k) const;
-  float MostOf(size_t k) const;
+  // Bounds of quantile k, available after EndCounting; NaN if there are no numbers.
+  float LowerBound(size_t k) const;
+  float UpperBound(size_t k) const;
 
-  // Quantile k is linear between the numbers of two neighbouring ranks, `low` + `fraction` · (`high` − `low`). After
-  // Refine; of no numbers: NaN.
+  // Quantile k is `low` + `fraction` · (`high` − `low`), between the numbers of two neighbouring ranks. Available after
+  // pass 2; NaN if there are no numbers.
   struct Place {
     float low, high;
     double fraction;
@@ -40,12 +40,12 @@ class RankSearch {
  private:
   static constexpr uint32_t kFineBits = 17;
   static constexpr size_t kFine = size_t{1} << kFineBits;
-  // Numbers as integers in the same order; −0 goes before 0.
+  // Maps floats to integers of the same order; −0 comes before 0.
   static uint32_t KeyOf(float value);
   static float ValueOf(uint32_t key);
 
   struct Rank {
-    uint64_t within = 0;  // numbers in the same coarse bin before it
+    uint64_t within = 0;  // index within its coarse bin
     uint32_t bin = 0;
   };
   Rank Find(uint64_t rank) const;

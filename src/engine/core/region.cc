@@ -5,9 +5,9 @@
 
 namespace anchorsplat {
 
-Region FromOrigin(Region region, const WorldOrigin& origin) {
-  region.low = FromOrigin(region.low, origin);
-  region.high = FromOrigin(region.high, origin);
+Region RelativeToOrigin(Region region, const WorldOrigin& origin) {
+  region.low = RelativeToOrigin(region.low, origin);
+  region.high = RelativeToOrigin(region.high, origin);
   return region;
 }
 

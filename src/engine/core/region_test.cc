@@ -18,9 +18,9 @@ TEST(Region, BoxesByAnyTwoCorners) {
   EXPECT_EQ(box->high, (std::array<double, 3>{1, 2, 3}));
   EXPECT_FALSE(box->radius);
   const float border[] = {1, 2, 3}, outside[] = {1.001f, 0, 1}, nan[] = {NAN, 0, 1};
-  EXPECT_TRUE(box->Holds(border));
-  EXPECT_FALSE(box->Holds(outside));
-  EXPECT_FALSE(box->Holds(nan));
+  EXPECT_TRUE(box->Contains(border));
+  EXPECT_FALSE(box->Contains(outside));
+  EXPECT_FALSE(box->Contains(nan));
   EXPECT_TRUE(Of({1, 1, 1, 1, 1, 1}));  // a point
 }
 
@@ -29,9 +29,9 @@ TEST(Region, SpheresByCentreAndRadius) {
   ASSERT_TRUE(sphere);
   EXPECT_EQ(sphere->radius, 2);
   const float border[] = {3, 0, 0}, outside[] = {-1, 1, 0}, nan[] = {1, NAN, 0};
-  EXPECT_TRUE(sphere->Holds(border));
-  EXPECT_FALSE(sphere->Holds(outside));
-  EXPECT_FALSE(sphere->Holds(nan));
+  EXPECT_TRUE(sphere->Contains(border));
+  EXPECT_FALSE(sphere->Contains(outside));
+  EXPECT_FALSE(sphere->Contains(nan));
 }
 
 TEST(Region, WhatIsNone) {

@@ -7,23 +7,23 @@
 
 namespace anchorsplat {
 
-// What kind of thing went wrong; the program maps each to an exit code (cli/exit_codes.h).
+// Category of a failure; the program maps each to an exit code (cli/exit_codes.h).
 enum class ErrorCode {
   kBadArgument,  // the caller asked for something impossible
   kNotFound,     // a file or folder is not there
   kBadFile,      // a file is there but malformed, truncated, hostile or of an unsupported kind
-  kExists,       // would overwrite something and was not told to
-  kIo,           // the system refused to read or write
+  kExists,       // would overwrite a file without permission
+  kIo,           // a system call to read or write failed
   kInterrupted,  // the user stopped it
 };
 
-// A failure as one sentence that a user can act on: file, byte or line, property, what was expected.
+// A failure, in one sentence that a user can act on: file, byte or line, property, what was expected.
 struct Error {
   ErrorCode code = ErrorCode::kBadArgument;
   std::string message;
 };
 
-// A value or an Error. Accessing the side that is not there is a programming error (std::bad_variant_access).
+// A value or an Error. Accessing the absent one is a programming error (std::bad_variant_access).
 template <typename T>
 class [[nodiscard]] Result {
  public:
@@ -60,7 +60,7 @@ class [[nodiscard]] Status {
 
 }  // namespace anchorsplat
 
-// Leaves the function with the error when `expression` (a Status or Result) failed.
+// Returns the error from the function if `expression` (a Status or Result) failed.
 #define ANCHORSPLAT_RETURN_IF_ERROR(expression)                                                              \
   do {                                                                                                       \
     if (auto anchorsplat_status = (expression); !anchorsplat_status.ok()) return anchorsplat_status.error(); \
@@ -76,6 +76,6 @@ class [[nodiscard]] Status {
 
 // NOLINTEND(bugprone-macro-parentheses)
 
-// ANCHORSPLAT_ASSIGN_OR_RETURN(auto cloud, ReadCloud(path)): the value, or leaves the function with the error.
+// ANCHORSPLAT_ASSIGN_OR_RETURN(auto cloud, ReadCloud(path)): declares `cloud` with the value, or returns the error.
 #define ANCHORSPLAT_ASSIGN_OR_RETURN(declaration, expression) \
   ANCHORSPLAT_ASSIGN_OR_RETURN_INNER(ANCHORSPLAT_CONCAT(anchorsplat_result_, __LINE__), declaration, expression)

@@ -5,8 +5,8 @@
 
 namespace anchorsplat {
 
-// Row-major rotation matrix of a wxyz quaternion of any non-zero norm; the zero quaternion gives the identity, as a
-// rotation must be something and this is what viewers show.
+// Row-major rotation matrix of a wxyz quaternion of any non-zero norm. The zero quaternion gives the identity, as
+// viewers do.
 template <typename T>
 std::array<T, 9> RotationFromQuaternion(T w, T x, T y, T z) {
   const T norm = std::sqrt(w * w + x * x + y * y + z * z);
@@ -20,8 +20,8 @@ std::array<T, 9> RotationFromQuaternion(T w, T x, T y, T z) {
           2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
 }
 
-// The rotation nearest to a matrix that is one up to rounding, to the last digits of double: what a file gives with
-// eight digits would move a camera at 4,500,000 m by centimetres.
+// The rotation nearest to an almost-rotation, exact to double precision: the eight digits of a file would move a camera
+// at 4,500,000 m by centimetres.
 std::array<double, 9> NearestRotation(const std::array<double, 9>& matrix);
 
 // wxyz unit quaternion (w ≥ 0) of a row-major rotation matrix.

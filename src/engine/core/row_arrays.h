@@ -8,9 +8,9 @@
 
 namespace anchorsplat {
 
-// Arrays of rows of `width` values each.
+// Operations on arrays of rows with `width` values each.
 
-// Closes up the rows for which keep[i] is set; their order stays.
+// Keeps rows with keep[i] set, in order.
 template <typename T>
 void KeepRows(Buffer<T>& array, int64_t width, const std::vector<char>& keep) {
   T* to = array.data();
@@ -23,7 +23,7 @@ void KeepRows(Buffer<T>& array, int64_t width, const std::vector<char>& keep) {
   array.resize(static_cast<size_t>(to - array.data()));
 }
 
-// Row i becomes the old row rows[i], a permutation: along its cycles, so that there is no second copy of the array.
+// Moves old row rows[i] to row i for a permutation `rows`, along its cycles, without a second copy of the array.
 template <typename T>
 void ReorderRows(Buffer<T>& array, int64_t width, const Buffer<uint32_t>& rows) {
   const size_t bytes = static_cast<size_t>(width) * sizeof(T);

@@ -9,17 +9,17 @@ namespace anchorsplat {
 
 namespace {
 
-// Of the result that is put in order at a time: it stays in the cache, and is no Buffer that could lie on disk.
+// Bytes of the result that are sorted at a time: it fits in the cache, and is too small to be a Buffer on disk.
 constexpr int64_t kBucketBytes = int64_t{3} << 20;
 constexpr int64_t kChunks = 16;
 
-// The pieces as one.
+// The pieces, concatenated.
 class Rows {
  public:
   Rows(std::span<const std::span<const float>> pieces, int64_t width) : pieces_(pieces), width_(width) {
     for (const auto piece : pieces) ends_.push_back((ends_.empty() ? 0 : ends_.back()) + std::ssize(piece) / width);
   }
-  // Calls with each row of begin to end.
+  // Calls `each` for rows begin to end.
   template <typename Body>
   void ForEach(int64_t begin, int64_t end, Body&& body) const {
     auto piece = static_cast<size_t>(std::ranges::upper_bound(ends_, begin) - ends_.begin());
@@ -54,8 +54,8 @@ Buffer<float> ScatterRows(std::span<const std::span<const float>> pieces, int64_
     });
     return out;
   }
-  // First each row into the part of the result that it belongs to, by the order of the input.
-  std::vector<int64_t> next(static_cast<size_t>(kChunks * buckets), 0);  // of a chunk in a bucket
+  // First pass: append each row to its bucket of the result, in input order.
+  std::vector<int64_t> next(static_cast<size_t>(kChunks * buckets), 0);  // per chunk and bucket
   ParallelFor(0, n, in_chunk, [&](int64_t begin, int64_t end) {
     int64_t* const counts = next.data() + begin / in_chunk * buckets;
     for (int64_t row = begin; row < end; ++row) ++counts[place(row) / in_bucket];

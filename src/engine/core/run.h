@@ -8,21 +8,21 @@
 
 namespace anchorsplat::internal {
 
-// A run as log.cc and parallel.cc see it. Of others, only threads that are started by hand need it: for TakePart.
+// A run, as log.cc and parallel.cc see it. Other code needs it only to make hand-started threads join a run (JoinRun).
 struct Run {
-  RunContext context;  // complete: what was left out is filled in, as far as an outer run has it
+  RunContext context;  // complete: defaults come from the outer run
   std::mutex log_mutex;
   std::shared_ptr<RunStorage> storage;
   TaskArena arena;  // loops of two runs do not wait for each other's work
 };
 
-// Makes a thread take part in a run.
-class TakePart {
+// Makes the calling thread part of a run until destroyed.
+class JoinRun {
  public:
-  explicit TakePart(const std::shared_ptr<Run>& run);
-  ~TakePart();
-  TakePart(const TakePart&) = delete;
-  TakePart& operator=(const TakePart&) = delete;
+  explicit JoinRun(const std::shared_ptr<Run>& run);
+  ~JoinRun();
+  JoinRun(const JoinRun&) = delete;
+  JoinRun& operator=(const JoinRun&) = delete;
 
  private:
   std::shared_ptr<Run> before_;

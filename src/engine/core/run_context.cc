@@ -22,8 +22,8 @@ RunStorage& CurrentStorage() {
   return run ? *run->storage : of_process;
 }
 
-TakePart::TakePart(const std::shared_ptr<Run>& run) : before_(std::exchange(OwnRun(), run)) {}
-TakePart::~TakePart() { OwnRun() = std::move(before_); }
+JoinRun::JoinRun(const std::shared_ptr<Run>& run) : before_(std::exchange(OwnRun(), run)) {}
+JoinRun::~JoinRun() { OwnRun() = std::move(before_); }
 
 }  // namespace internal
 
@@ -40,7 +40,7 @@ RunScope::RunScope(RunContext context) : before_(internal::CurrentRun()) {
   run->context = std::move(context);
   run->storage = before_ ? before_->storage : std::make_shared<internal::RunStorage>();
   internal::OwnRun() = run;
-  if (run->context.threads > 0) run->arena.initialize(ThreadCount());  // oneTBB complains of more than the machine has
+  if (run->context.threads > 0) run->arena.initialize(ThreadCount());  // oneTBB warns above the machine's count
 }
 
 RunScope::~RunScope() { internal::OwnRun() = std::move(before_); }

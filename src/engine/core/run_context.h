@@ -13,37 +13,36 @@
 
 namespace anchorsplat {
 
-// What a long call works with. Programs that make several calls at the same time give each its own:
+// Settings of a long call. Programs that run several calls at a time give each its own:
 //
 //   const RunScope run({.threads = 4, .sink = mine, .stop = &cancelled});
 //   auto enhanced = Enhance(cloud, options);
 //
-// Until the scope ends it belongs to all that this thread does, and to the parallel loops that it starts, whichever
-// thread works on them: messages and progress go to `sink`, loops use at most `threads`, and what can be interrupted
-// ends in order when `stop` becomes true. Results do not depend on any of it. Runs of two threads do not see each
-// other. Threads that are started by hand take part in no run.
+// Until the scope ends, they apply to everything this thread does and to the parallel loops it starts: messages and
+// progress go to `sink`, loops use at most `threads`, and interruptible work ends cleanly once `stop` is true. Results
+// do not depend on them. Runs of different threads are independent; threads started by hand belong to no run.
 //
-// What is left out is that of the scope around this one, or of the process (SetThreadCount, SetLogSink; no stop flag).
+// Unset members come from the enclosing scope, or from the process (SetThreadCount, SetLogSink; no stop flag).
 struct RunContext {
-  int threads = 0;                          // at most; 0: no limit of its own
-  std::shared_ptr<LogSink> sink = nullptr;  // its events are serialised
+  int threads = 0;                          // at most; 0: no limit
+  std::shared_ptr<LogSink> sink = nullptr;  // gets one event at a time
   const std::atomic<bool>* stop = nullptr;  // must outlive the scope
-  // Becomes true when nothing of the run is wanted any more: its next parallel loop, or the next part of the one that
-  // runs, throws RunAbandoned, whatever it is about. Must outlive the scope.
+  // Set to true to discard the run: its next parallel loop, or the next part of the running one, throws RunAbandoned.
+  // Must outlive the scope.
   const std::atomic<bool>* abandon = nullptr;
-  std::optional<DeviceChoice> device = std::nullopt;  // where pictures are rasterized; the CPU where no run says
-  uint64_t max_gpu_memory = 0;                        // bytes of GPU memory at most; 0: kDefaultGpuMemory
+  std::optional<DeviceChoice> device = std::nullopt;  // of the rasterizer; default: the CPU
+  uint64_t max_gpu_memory = 0;                        // limit in bytes; 0: kDefaultGpuMemory
 };
 
-// WebGPU cannot be asked how much memory is free.
+// WebGPU cannot report how much memory is free.
 inline constexpr uint64_t kDefaultGpuMemory = uint64_t{2} << 30;  // bytes
 
-// Ends a run from inside. What a run holds is given back on the way, and files that are not whole are never named.
+// Thrown to end an abandoned run. Resources are freed on the way, and incomplete files never get a name.
 struct RunAbandoned {};
 
 namespace internal {
 
-// What is kept for as long as a run, one of each type.
+// Objects that live as long as a run, one per type.
 class RunStorage {
  public:
   template <typename T>
@@ -60,9 +59,9 @@ class RunStorage {
 };
 
 struct Run;
-// Of the run that this thread takes part in; null where there is none.
+// The run of this thread; null if there is none.
 const std::shared_ptr<Run>& CurrentRun();
-// Of that run or, without one, of the process.
+// Its storage, or that of the process.
 RunStorage& CurrentStorage();
 
 }  // namespace internal
@@ -78,14 +77,14 @@ class RunScope {
   std::shared_ptr<internal::Run> before_;
 };
 
-// Of the run that this thread takes part in, or the defaults of RunContext.
+// Settings of this thread's run, or the defaults of RunContext.
 DeviceChoice DeviceChoiceOfRun();
 uint64_t MaxGpuMemoryOfRun();  // bytes
 
-// Whether the run that this thread takes part in is asked to end. Cheap: long loops ask at every step.
+// Whether this thread's run is asked to stop. Cheap enough for every step of a loop.
 bool StopRequested();
 
-// Throws RunAbandoned when the run is. For what takes long without parallel loops; these ask by themselves.
+// Throws RunAbandoned if the run is abandoned. For long work without parallel loops, which check by themselves.
 void LeaveIfAbandoned();
 
 }  // namespace anchorsplat

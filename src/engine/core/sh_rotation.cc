@@ -12,7 +12,7 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int kDirections = 32;  // any number above 7 that is spread around determines all degrees
+constexpr int kDirections = 32;  // any well-spread number above 7 determines all degrees
 
 std::array<double, 3> Direction(int i) {
   const double z = 1 - (2 * i + 1.0) / kDirections, ring = std::sqrt(1 - z * z);

@@ -5,14 +5,13 @@
 
 namespace anchorsplat {
 
-// How spherical harmonics change when what they describe is rotated or mirrored: for the orthogonal matrix M
-// (row-major, determinant ±1) the function f(d) becomes f(Mᵀ·d). Degrees do not mix, so each has a matrix of its own;
-// degree 0 does not change at all.
+// Transforms spherical harmonics for a rotated or mirrored world: with the orthogonal matrix M (row-major, determinant
+// ±1) the function f(d) becomes f(Mᵀ·d). Each degree has its own matrix; degree 0 is invariant.
 class ShRotation {
  public:
   explicit ShRotation(const std::array<double, 9>& matrix);
 
-  // In place: `coefficients` [C,3], coefficient-major, C = 1, 4, 9 or 16 of the given degree.
+  // In place: `coefficients` [C,3], coefficient-major, C = (degree + 1)².
   void Apply(float* coefficients, int degree) const;
 
  private:

@@ -9,10 +9,10 @@
 
 namespace anchorsplat {
 
-// Those that were compiled and that this machine supports, the best one first.
+// SIMD targets that were compiled and that this machine supports, best first.
 inline std::vector<int64_t> SimdTargetsHere() { return hwy::SupportedAndGeneratedTargets(); }
 
-// Calls body() once per SIMD target, the best one last, so that the narrow ones are tested too.
+// Calls body() once per SIMD target, best last, to test the narrow ones too.
 template <typename Body>
 void ForEachSimdTarget(Body&& body) {
   const auto targets = SimdTargetsHere();
@@ -26,8 +26,8 @@ void ForEachSimdTarget(Body&& body) {
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());
 }
 
-// At the end of a test which says that every instruction set was looked at: where there is only one it is skipped, not
-// passed, and CTest lists it so. What that one computes was compared all the same, and a failure stays a failure.
+// For the end of a test that compares all instruction sets: on a machine with only one, the test is reported as
+// skipped, not passed. Its own results were checked all the same, and a failure stays a failure.
 inline void SkipWhenOnlyOneSimdTarget(const std::vector<int64_t>& targets = SimdTargetsHere()) {
   if (targets.size() > 1) return;
   GTEST_SKIP() << "this machine runs only one of the compiled instruction sets, "

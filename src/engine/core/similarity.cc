@@ -19,7 +19,7 @@ Similarity Inverse(const Similarity& s) {
   return inverse;
 }
 
-Similarity After(const Similarity& outer, const Similarity& inner) {
+Similarity Compose(const Similarity& outer, const Similarity& inner) {
   Similarity both{{}, outer.Apply(inner.translation), outer.scale * inner.scale};
   for (size_t i = 0; i < 3; ++i) {
     for (size_t j = 0; j < 3; ++j) {

@@ -4,7 +4,7 @@
 
 namespace anchorsplat {
 
-// p ↦ scale · rotation · p + translation, of points of a world.
+// Similarity transform of world points: p ↦ scale · rotation · p + translation.
 struct Similarity {
   std::array<double, 9> rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1};  // row-major
   std::array<double, 3> translation = {0, 0, 0};
@@ -15,7 +15,7 @@ struct Similarity {
 };
 
 Similarity Inverse(const Similarity& s);
-// First `inner`, then `outer`.
-Similarity After(const Similarity& outer, const Similarity& inner);
+// p ↦ outer(inner(p)).
+Similarity Compose(const Similarity& outer, const Similarity& inner);
 
 }  // namespace anchorsplat

@@ -15,8 +15,8 @@ constexpr int64_t kSmoothedRows = 4096;
 
 }  // namespace
 
-double Smoothing::LeftOpen(double opacity_logit) const {
-  return Sigmoid(-opacity_logit) + Sigmoid(opacity_logit) * -std::expm1(log_kept);
+double Smoothing::Transmittance(double opacity_logit) const {
+  return Sigmoid(-opacity_logit) + Sigmoid(opacity_logit) * -std::expm1(log_opacity_factor);
 }
 
 Smoothing SmoothingOf(const float* log_scales, double size) {
@@ -26,7 +26,7 @@ Smoothing SmoothingOf(const float* log_scales, double size) {
     const double s = log_scales[a];
     out.log_scales[a] = std::max(s, log_size) + 0.5 * std::log1p(std::exp(-2 * std::abs(s - log_size)));
     out.shares[a] = 1 / (1 + std::exp(2 * (log_size - s)));
-    out.log_kept += s - out.log_scales[a];
+    out.log_opacity_factor += s - out.log_scales[a];
   }
   return out;
 }
@@ -42,8 +42,8 @@ void Smooth(const GaussianCloud& cloud, std::span<const float> sizes, float* log
         continue;
       }
       const Smoothing smoothing = SmoothingOf(s, double{sizes[i]});
-      const double left = smoothing.LeftOpen(double{logit});
-      opacity_logits[i] = static_cast<float>(smoothing.log_kept + LogSigmoid(double{logit}) - std::log(left));
+      const double left = smoothing.Transmittance(double{logit});
+      opacity_logits[i] = static_cast<float>(smoothing.log_opacity_factor + LogSigmoid(double{logit}) - std::log(left));
       for (size_t a = 0; a < 3; ++a) log_scales[3 * i + a] = static_cast<float>(smoothing.log_scales[a]);
     }
   });

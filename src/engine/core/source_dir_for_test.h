@@ -4,8 +4,8 @@
 
 namespace anchorsplat {
 
-// The checkout that a test was built from: where `testdata/`, `examples/` and `configs/` are. Defined in one generated
-// file (cmake/Room.cmake) and not by a macro, so that a test compiles to the same object wherever the checkout lies.
+// The checkout that a test was built from, with `testdata/`, `examples/` and `configs/`. Defined in one generated file
+// (cmake/Room.cmake) instead of a macro, so that object files do not depend on the checkout's path.
 std::filesystem::path SourceDirForTest();
 
 }  // namespace anchorsplat

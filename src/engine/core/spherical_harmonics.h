@@ -4,8 +4,8 @@
 
 namespace anchorsplat {
 
-// Real spherical harmonics as 3DGS uses them (Kerbl et al. 2023; gsplat): colour = max(Σ c_k Y_k(d) + 0.5, 0), d the
-// unit vector from the camera centre to the Gaussian. Constants in the order of the formulas of degree 0–3.
+// Real spherical harmonics of 3DGS (Kerbl et al. 2023; gsplat): colour = max(Σ c_k Y_k(d) + 0.5, 0), with d the unit
+// vector from the camera centre to the Gaussian. The constants follow the order of the formulas of degree 0–3.
 inline constexpr float kSh0 = 0.28209479177387814f;
 inline constexpr float kSh1 = 0.48860251190291992f;
 inline constexpr std::array<float, 3> kSh2 = {1.0925484305920792f, 0.94617469575755997f, 0.31539156525251999f};
@@ -36,7 +36,7 @@ std::array<T, 16> ShBasis(T x, T y, T z) {
           -T(kSh3[0]) * x * (xx - 3 * yy)};
 }
 
-// Stored DC coefficient of a plain colour in 0–1, and back.
+// Stored DC coefficient of a colour in 0–1, and back.
 constexpr float DcFromColor(float color) { return (color - 0.5f) / kSh0; }
 constexpr float ColorFromDc(float dc) { return 0.5f + kSh0 * dc; }
 

@@ -41,7 +41,7 @@ std::optional<std::array<float, 3>> ParseBackground(std::string_view text) {
   return text.empty() ? std::optional(background) : std::nullopt;
 }
 
-// Three numbers with `between` before, between and behind them, and nothing else.
+// Parses three numbers separated and surrounded by `between` characters.
 std::optional<Vec3> ThreeNumbers(std::string_view text, std::string_view between) {
   const auto skip = [&] { text.remove_prefix(std::min(text.find_first_not_of(between), text.size())); };
   Vec3 numbers{};
@@ -59,7 +59,7 @@ std::optional<Vec3> OwnUp(std::string_view text) {
   return text.starts_with(kUpMark) ? ThreeNumbers(text.substr(kUpMark.size()), " ") : std::nullopt;
 }
 
-// What follows "vertical axis:" in any case; nothing in other comments.
+// Text after "vertical axis:", in any case; none in other comments.
 std::optional<std::string> VerticalAxis(std::string_view text) {
   if (text.size() < kVerticalAxis.size()) return std::nullopt;
   std::string small(text);
@@ -178,11 +178,11 @@ void TurnUpComments(const std::array<double, 9>& m, std::vector<std::string>& co
     Vec3 turned{};
     for (size_t k = 0; k < 3; ++k) {
       turned[k] = m[3 * k] * (*up)[0] + m[3 * k + 1] * (*up)[1] + m[3 * k + 2] * (*up)[2];
-      if (turned[k] == 0) turned[k] = 0;  // no negative zeros for people to wonder at
+      if (turned[k] == 0) turned[k] = 0;  // avoid printing −0
     }
     comment = UpComment(turned);
   }
-  // An axis without a sign says nothing any more where it may be another one now.
+  // An unsigned axis is meaningless once it may have become another one.
   const bool same_axis = m[4] != 0;
   if (!same_axis) std::erase_if(comments, [](const std::string& comment) { return VerticalAxis(comment) == "y"; });
 }

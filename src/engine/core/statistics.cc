@@ -19,7 +19,7 @@ float Quantile(std::span<float> values, double q) {
   const double fraction = at - static_cast<double>(below);
   if (fraction == 0) return low;
   const float high = *std::min_element(nth + 1, values.end());
-  if (low == high) return low;  // infinite ones have no difference
+  if (low == high) return low;  // avoids Inf − Inf
   return static_cast<float>(low + fraction * (static_cast<double>(high) - low));
 }
 

@@ -20,8 +20,8 @@ namespace anchorsplat {
 
 namespace {
 
-// What quantiles are wanted of. Those of lengths and opacities are of their stored logarithms and logits: in the same
-// order, and two exponentials instead of one per Gaussian.
+// Columns with quantiles. Those of lengths and opacities use the stored logarithms and logits: the order is the same,
+// and it saves two exponentials per Gaussian.
 enum Column : size_t { kLargest, kSmallest, kRatio, kOpacity, kColumns };
 
 constexpr float kEndless = std::numeric_limits<float>::infinity();
@@ -34,7 +34,7 @@ void Widen(Bounds& box, const float* low, const float* high) {
   }
 }
 
-// Numbers of one block, side by side as quantiles take them.
+// Values of one block, one array per column.
 struct Values {
   std::array<Buffer<float>, kColumns> columns;
 
@@ -69,11 +69,11 @@ bool IsPlausible(const CloudView& cloud, size_t i) {
 }
 
 float Between(float low, float high, double fraction) {
-  if (fraction == 0 || low == high) return low;  // infinite ones have no difference
+  if (fraction == 0 || low == high) return low;  // avoids Inf − Inf
   return static_cast<float>(low + fraction * (static_cast<double>(high) - low));
 }
 
-// What one thread at a time counts into.
+// Counters of one thread.
 struct Tally {
   std::array<std::vector<uint32_t>, kColumns> counts;
   CloudStatistics sums;
@@ -85,7 +85,7 @@ struct Tally {
   void Add(const CloudBlock& block) {
     values.Take(block, [&](size_t i) { Count(block.rows, i); });
     for (size_t c = 0; c < kColumns; ++c) {
-      for (const float value : values.columns[c]) ++counts[c][RankSearch::CoarseOf(value)];
+      for (const float value : values.columns[c]) ++counts[c][RankSearch::CoarseBin(value)];
     }
     sums.not_finite += block.size() - std::ssize(values.columns[kOpacity]);
   }
@@ -114,9 +114,9 @@ struct StatisticsStudy::State {
   const int64_t gaussians;
   int sh_degree = 0;
   std::mutex mutex;
-  std::vector<std::unique_ptr<Tally>> tallies;  // that no thread has just now
-  std::map<int64_t, StoredSample> samples;      // by the first row of their blocks: the same with any threads
-  std::vector<Bounds> bounds;                   // of each block: which of two zeros counts must not depend on threads
+  std::vector<std::unique_ptr<Tally>> tallies;  // not in use by a thread
+  std::map<int64_t, StoredSample> samples;      // by first row of the block, so that threads do not matter
+  std::vector<Bounds> bounds;                   // per block: −0 or 0 must not depend on threads
   std::vector<RankSearch> searches;             // one per column
   Tally sum;
   FramingStudy framing_study;
@@ -142,7 +142,7 @@ struct StatisticsStudy::State {
   }
 
   void CountBlock(const CloudBlock& block) {
-    framing_study.Look(block.first, block.rows);
+    framing_study.Visit(block.first, block.rows);
     Bounds& box = bounds[static_cast<size_t>(block.first / kCloudBlockRows)];
     for (size_t i = 0; i < block.usable.size(); ++i) {
       if (block.usable[i] != 0) {
@@ -163,7 +163,7 @@ struct StatisticsStudy::State {
 };
 
 void StatisticsStudy::State::TakeSample(const CloudBlock& block) {
-  const int64_t step = StoredSample::StepOf(gaussians);
+  const int64_t step = StoredSample::Stride(gaussians);
   StoredSample sample;
   for (int64_t row = (block.first + step - 1) / step * step; row < block.first + block.size(); row += step) {
     sample.Add(block.rows, row - block.first);
@@ -175,7 +175,7 @@ void StatisticsStudy::State::TakeSample(const CloudBlock& block) {
 
 StoredSample StatisticsStudy::State::WholeSample() const {
   StoredSample whole;
-  whole.of = gaussians;
+  whole.total = gaussians;
   for (const auto& [first, part] : samples) {
     for (const auto array :
          {&StoredSample::means, &StoredSample::scales, &StoredSample::opacities, &StoredSample::colors}) {
@@ -229,7 +229,7 @@ StatisticsStudy::~StatisticsStudy() = default;
 
 bool StatisticsStudy::done() const { return state_->pass >= 2; }
 
-void StatisticsStudy::Look(const CloudBlock& block) {
+void StatisticsStudy::Visit(const CloudBlock& block) {
   if (state_->pass == 0) {
     state_->CountBlock(block);
   } else {

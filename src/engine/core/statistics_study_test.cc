@@ -25,7 +25,7 @@ std::vector<float> Found(const std::vector<float>& values, std::span<const doubl
   const size_t half = values.size() / 3;
   for (const auto& [first, last] : {std::pair(size_t{0}, half), std::pair(half, values.size())}) {
     std::vector<uint32_t> counts(RankSearch::kCoarse);
-    for (size_t i = first; i < last; ++i) ++counts[RankSearch::CoarseOf(values[i])];
+    for (size_t i = first; i < last; ++i) ++counts[RankSearch::CoarseBin(values[i])];
     search.Count(counts);
   }
   search.EndCounting();
@@ -34,7 +34,7 @@ std::vector<float> Found(const std::vector<float>& values, std::span<const doubl
   std::vector<float> out;
   for (size_t k = 0; k < quantiles.size(); ++k) {
     const RankSearch::Place at = search.At(k);
-    EXPECT_FALSE(at.low < search.LeastOf(k) || at.high > search.MostOf(k));
+    EXPECT_FALSE(at.low < search.LowerBound(k) || at.high > search.UpperBound(k));
     out.push_back(at.fraction == 0 || at.low == at.high
                       ? at.low
                       : static_cast<float>(at.low + at.fraction * (double{at.high} - at.low)));
@@ -127,7 +127,7 @@ void ExpectSame(const CloudStatistics& a, const CloudStatistics& b) {
 }
 
 // With one of each kind of trouble here and there.
-GaussianCloud TroubledCloud(int64_t n, int degree) {
+GaussianCloud CloudWithNonFinite(int64_t n, int degree) {
   GaussianCloud cloud;
   cloud.Resize(n, degree);
   Random random(static_cast<uint64_t>(n));
@@ -173,7 +173,7 @@ GaussianCloud TroubledCloud(int64_t n, int degree) {
 TEST(StatisticsStudy, AgreesWithThePlainWay) {
   for (const auto& [n, degree] : {std::pair(int64_t{1}, 0), std::pair(int64_t{3}, 0), std::pair(int64_t{500}, 1),
                                   std::pair(3 * kCloudBlockRows + 17, 3)}) {
-    const GaussianCloud cloud = TroubledCloud(n, degree);
+    const GaussianCloud cloud = CloudWithNonFinite(n, degree);
     const CloudStatistics expected = Reference(cloud);
     for (const int threads : {1, 3}) {
       SetThreadCount(threads);
@@ -188,15 +188,15 @@ TEST(StatisticsStudy, AgreesWithThePlainWay) {
 }
 
 TEST(FramingStudy, AgreesWithFrameCloud) {
-  GaussianCloud haze = TroubledCloud(200, 0);
+  GaussianCloud haze = CloudWithNonFinite(200, 0);
   for (float& x : haze.opacity_logits) x = -5;
-  GaussianCloud point = TroubledCloud(50, 0);
+  GaussianCloud point = CloudWithNonFinite(50, 0);
   std::ranges::fill(point.means, 1.0f);
   for (const GaussianCloud& cloud :
-       {TroubledCloud(5000, 0), haze, point, TroubledCloud(1'000'300, 0), GaussianCloud{}}) {
+       {CloudWithNonFinite(5000, 0), haze, point, CloudWithNonFinite(1'000'300, 0), GaussianCloud{}}) {
     MemoryBlocks blocks{CloudView(cloud)};
     FramingStudy study(cloud.size());
-    ASSERT_TRUE(blocks.ForEach([&](const CloudBlock& block) { study.Look(block.first, block.rows); }).ok());
+    ASSERT_TRUE(blocks.ForEach([&](const CloudBlock& block) { study.Visit(block.first, block.rows); }).ok());
     const Framing found = study.Find(), expected = FrameCloud(cloud);
     EXPECT_EQ(found.target, expected.target) << cloud.size();
     EXPECT_EQ(found.radius, expected.radius) << cloud.size();
@@ -204,7 +204,7 @@ TEST(FramingStudy, AgreesWithFrameCloud) {
 }
 
 TEST(MemoryBlocks, ShowEachRowOnceWithoutItsHarmonics) {
-  const GaussianCloud cloud = TroubledCloud(2 * kCloudBlockRows + 5, 2);
+  const GaussianCloud cloud = CloudWithNonFinite(2 * kCloudBlockRows + 5, 2);
   MemoryBlocks blocks{CloudView(cloud)};
   for (int pass = 0; pass < 2; ++pass) {
     std::vector<int> seen(static_cast<size_t>(cloud.size()));

@@ -4,17 +4,17 @@
 
 namespace anchorsplat {
 
-// Seconds on the clock.
+// Wall-clock time in seconds.
 class Stopwatch {
  public:
-  // Since the last lap, or since the beginning.
+  // Since the last lap or construction.
   double Lap() {
     const auto now = Clock::now();
     const double seconds = std::chrono::duration<double>(now - lap_).count();
     lap_ = now;
     return seconds;
   }
-  // Since the beginning.
+  // Since construction.
   double Total() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
 
  private:

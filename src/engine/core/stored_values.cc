@@ -14,7 +14,7 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr size_t kFewestRows = 100;  // of which anything can be said
+constexpr size_t kFewestRows = 100;  // fewer tell nothing
 constexpr double kNearlyAll = 0.99;
 
 double ShareBelow(const std::vector<float>& values, float bound) {
@@ -26,7 +26,7 @@ double ShareBelow(const std::vector<float>& values, float bound) {
 
 void StoredSample::Add(const CloudView& rows, int64_t row) {
   const auto i = static_cast<size_t>(row);
-  // Lengths in the place of logarithms may be larger than any that is drawn.
+  // Lengths misread as logarithms may exceed kMaxLogScale.
   const auto is_scale = [](float x) { return !std::isnan(x) && x < std::numeric_limits<float>::infinity(); };
   const float* const stored = rows.log_scales.data() + 3 * row;
   if (!AllFinite(rows.means.data() + 3 * row, 3) || !std::all_of(stored, stored + 3, is_scale) ||
@@ -42,10 +42,10 @@ void StoredSample::Add(const CloudView& rows, int64_t row) {
   opacities.push_back(rows.opacity_logits[i]);
 }
 
-StoredSample SampleOf(const CloudView& cloud) {
+StoredSample SampleStored(const CloudView& cloud) {
   StoredSample sample;
-  sample.of = cloud.size();
-  for (int64_t i = 0; i < cloud.size(); i += StoredSample::StepOf(cloud.size())) {
+  sample.total = cloud.size();
+  for (int64_t i = 0; i < cloud.size(); i += StoredSample::Stride(cloud.size())) {
     sample.Add(cloud, i);
   }
   return sample;
@@ -69,38 +69,38 @@ bool LooksLikeLengths(const StoredSample& sample) {
   const float extent = std::max({max[0] - min[0], max[1] - min[1], max[2] - min[2]});
   std::vector<float> sorted = largest;
   const float median = Quantile(sorted, 0.5);
-  // Lengths longer than all of it.
+  // As logarithms, half of the Gaussians would be longer than the splat.
   if (std::exp(median) > extent && extent > 0) return true;
   if (n < kFewestRows) return false;
 
-  // A quarter and more of the shortest axes just above zero, and not all alike there: logarithms go on below it.
+  // At least a quarter of the shortest axes lie just above zero and vary there: logarithms would continue below zero.
   sorted = smallest;
-  std::erase_if(sorted, [](float x) { return !(x > 0); });  // what is flat says nothing
+  std::erase_if(sorted, [](float x) { return !(x > 0); });  // flat Gaussians tell nothing
   constexpr float kJustAbove = 0.2f, kUnlike = 1.2f;
   if (4 * sorted.size() > n) {
     const float lowest = Quantile(sorted, 0.05), quarter = Quantile(sorted, 0.25);
     if (quarter <= kJustAbove && quarter > kUnlike * lowest) return true;
   }
 
-  // Against the way to the next one. Thinning out points of a surface makes it longer by a root.
+  // Compare with the distance to the nearest neighbour. Subsampling a surface by n increases it by √n.
   const KdTree tree(sample.means);
-  const double thinned = std::sqrt(static_cast<double>(n) / static_cast<double>(std::max<int64_t>(sample.of, 1)));
+  const double thinned = std::sqrt(static_cast<double>(n) / static_cast<double>(std::max<int64_t>(sample.total, 1)));
   std::vector<float> as_logarithms, as_lengths;
   for (int64_t place = 0; place < tree.size(); ++place) {
     KdTree::Neighbour next;
     if (tree.Nearest(place, std::span(&next, 1)) == 0) continue;
     const double way = std::sqrt(next.squared_distance) * thinned;
     const float length = largest[static_cast<size_t>(tree.PointAt(place))];
-    if (!(way > 1e-9 * double{extent}) || !(length > 0)) continue;  // copies lie at one place
+    if (!(way > 1e-9 * double{extent}) || !(length > 0)) continue;  // duplicates coincide
     as_logarithms.push_back(static_cast<float>(double{length} - std::log(way)));
     as_lengths.push_back(static_cast<float>(std::log(double{length} / way)));
   }
   if (2 * as_lengths.size() < n) return false;
-  // Of 18 splats of the field that were looked at, half of the Gaussians are 1 to 7 times as long as the way to the
-  // next.
+  // In 18 inspected splats of the field, half of the Gaussians are 1 to 7 times as long as the distance to their
+  // neighbour.
   constexpr double kShort = 0.2, kLong = 25;
   sorted = largest;
-  // All from one unit to 1.6 units long: alike as hardly any splat's are.
+  // All from 1 to 1.6 units long: more uniform than almost any splat.
   const bool alike = Quantile(sorted, 0.99) < 0.5f;
   const float logarithm = Quantile(as_logarithms, 0.5), length = Quantile(as_lengths, 0.5);
   return logarithm > std::log(alike ? 8.0 : 30.0) && length > std::log(kShort) && length < std::log(kLong);
@@ -118,10 +118,10 @@ int LooksLikeColors(const StoredSample& sample) {
   const auto [low, high] = std::ranges::minmax(sample.colors);
   if (!(low >= 0)) return 0;
   std::vector<float> sorted(sample.colors.begin(), sample.colors.end());
-  // As harmonics these would be light greys only, and none of them beyond the ends.
+  // As harmonics these would be light greys only, never beyond 0–1.
   constexpr float kWide = 0.6f;
   if (high <= 1) return Quantile(sorted, 0.99) - Quantile(sorted, 0.01) > kWide ? 1 : 0;
-  // White is 1.8; an average of ten is beyond all light.
+  // White is 1.8; an average of 10 is brighter than any light.
   return high <= 255 && Quantile(sorted, 0.5) > 10 ? 255 : 0;
 }
 

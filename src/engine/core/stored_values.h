@@ -8,32 +8,32 @@
 
 namespace anchorsplat {
 
-// Whether the values of a splat look like what some programs store instead of logarithms, logits and harmonics. All of
-// these say yes only where the other reading is next to impossible: splats of any unit and kind are not to be
-// suspected.
+// Detects splats that store lengths, opacities and colours instead of logarithms, logits and harmonics. All checks are
+// conservative: they say yes only if the other reading is next to impossible, for splats of any unit and kind.
 
-// Some Gaussians of a splat, spread over all of it.
+// Evenly spaced rows of a splat.
 struct StoredSample {
-  int64_t of = 0;           // how many there are
+  int64_t total = 0;        // rows of the splat
   Buffer<float> means;      // [n,3]
   Buffer<float> scales;     // [n,3] as stored
   Buffer<float> opacities;  // [n] as stored
   Buffer<float> colors;     // [n,3] f_dc
 
-  static constexpr int64_t kMost = 1 << 14;
-  // Every so many-th of `of` rows is in it.
-  static int64_t StepOf(int64_t of) { return of / kMost + 1; }
-  void Add(const CloudView& rows, int64_t row);  // not if it is not usable
+  static constexpr int64_t kMaxRows = 1 << 14;
+  // Distance between sampled rows of a splat with `total` rows.
+  static int64_t Stride(int64_t total) { return total / kMaxRows + 1; }
+  void Add(const CloudView& rows, int64_t row);  // skips a row with NaN
 };
-StoredSample SampleOf(const CloudView& cloud);
+StoredSample SampleStored(const CloudView& cloud);
 
-// Lengths, which are never negative. Logarithms that are not, of a splat in large units, have hardly any values just
-// above zero, where those of thin Gaussians lie; nor are all Gaussians longer than the splat, or many times longer than
-// the way to the next one, where the same numbers taken for lengths are about as long as that.
+// Whether scales are lengths, which are never negative. Logarithms without negative values come from splats in large
+// units, and differ in two ways: hardly any lie just above zero, where lengths of thin Gaussians do; and Gaussians are
+// not all longer than the splat, nor many times longer than the distance to their neighbour, when the same values read
+// as lengths match that distance.
 bool LooksLikeLengths(const StoredSample& sample);
-// From 0 to 1: logits in there would be opacities of 50 to 73 % only.
+// Whether opacities are stored as 0–1: as logits, these would be opacities of only 50 to 73 %.
 bool LooksLikeOpacities(const StoredSample& sample);
-// 1: f_dc are colours from 0 to 1, most of it and nothing beyond; 255: from 0 to 255; 0: neither.
+// 1: f_dc are colours that fill most of 0–1 and nothing beyond; 255: colours in 0–255; 0: neither.
 int LooksLikeColors(const StoredSample& sample);
 
 }  // namespace anchorsplat

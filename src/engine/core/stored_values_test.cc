@@ -37,11 +37,11 @@ TEST(StoredValues, LengthsInAnyUnitAndShape) {
     for (const double thin : {1.0, 3.0, 30.0, 1000.0}) {
       for (const double units : {0.01, 1.0, 30.0, 1e3, 1e5}) {
         GaussianCloud cloud = Wall(n, units, thin, 0.5);
-        EXPECT_FALSE(LooksLikeLengths(SampleOf(cloud))) << n << " thin " << thin << " units " << units;
+        EXPECT_FALSE(LooksLikeLengths(SampleStored(cloud))) << n << " thin " << thin << " units " << units;
         for (float& x : cloud.log_scales) x = std::exp(x);
         // Nearly round ones of about a unit are as likely logarithms.
         if (thin <= 3 && units == 30) continue;
-        EXPECT_TRUE(LooksLikeLengths(SampleOf(cloud))) << n << " thin " << thin << " units " << units;
+        EXPECT_TRUE(LooksLikeLengths(SampleStored(cloud))) << n << " thin " << thin << " units " << units;
       }
     }
   }
@@ -52,26 +52,26 @@ TEST(StoredValues, LogarithmsThatLieHigh) {
   for (const float scale : {0.0f, 0.3f, 2.0f}) {
     GaussianCloud cloud = Wall(2'000, 100, 1, 0.0);
     for (float& x : cloud.log_scales) x = scale;
-    EXPECT_FALSE(LooksLikeLengths(SampleOf(cloud))) << scale;
+    EXPECT_FALSE(LooksLikeLengths(SampleStored(cloud))) << scale;
   }
   GaussianCloud few = Wall(1, 1, 1, 0);
-  EXPECT_FALSE(LooksLikeLengths(SampleOf(few)));
-  EXPECT_FALSE(LooksLikeLengths(SampleOf(GaussianCloud())));
+  EXPECT_FALSE(LooksLikeLengths(SampleStored(few)));
+  EXPECT_FALSE(LooksLikeLengths(SampleStored(GaussianCloud())));
 }
 
 TEST(StoredValues, OpacitiesAndColors) {
   GaussianCloud cloud = Wall(1'000, 1, 3, 0.5);
-  EXPECT_FALSE(LooksLikeOpacities(SampleOf(cloud)));
-  EXPECT_EQ(LooksLikeColors(SampleOf(cloud)), 0);
+  EXPECT_FALSE(LooksLikeOpacities(SampleStored(cloud)));
+  EXPECT_EQ(LooksLikeColors(SampleStored(cloud)), 0);
   for (float& x : cloud.opacity_logits) x = 1 / (1 + std::exp(-x));
-  EXPECT_TRUE(LooksLikeOpacities(SampleOf(cloud)));
+  EXPECT_TRUE(LooksLikeOpacities(SampleStored(cloud)));
   for (float& x : cloud.sh) x = ColorFromDc(x);
-  EXPECT_EQ(LooksLikeColors(SampleOf(cloud)), 1);
+  EXPECT_EQ(LooksLikeColors(SampleStored(cloud)), 1);
   for (float& x : cloud.sh) x *= 255;
-  EXPECT_EQ(LooksLikeColors(SampleOf(cloud)), 255);
+  EXPECT_EQ(LooksLikeColors(SampleStored(cloud)), 255);
   // Light grey all over.
   for (float& x : cloud.sh) x = 0.2f + 0.5f * x / 255;
-  EXPECT_EQ(LooksLikeColors(SampleOf(cloud)), 0);
+  EXPECT_EQ(LooksLikeColors(SampleStored(cloud)), 0);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #pragma once
 
-// The threads that loops of one run share: oneTBB's own, or places for helpers of core/workers (ANCHORSPLAT_WORKERS).
+// Threads shared by the loops of one run: a oneTBB arena, or a count of helpers from core/workers
+// (ANCHORSPLAT_WORKERS).
 #ifndef ANCHORSPLAT_WORKERS
 
 #include <tbb/task_arena.h>
@@ -14,7 +15,7 @@ using TaskArena = tbb::task_arena;
 #include <climits>
 
 namespace anchorsplat::internal {
-// Its pool locks it.
+// Guarded by the mutex of the pool.
 class TaskArena {
  public:
   void initialize(int threads) { free_ = threads - 1; }

@@ -49,8 +49,7 @@ std::string HumanSeconds(double seconds) {
 }
 
 namespace {
-// The characters that change the direction of what follows them (Unicode's Bidi_Control): a line that holds them can
-// read as another one.
+// Characters that change text direction (Unicode Bidi_Control): they can make a line read as another one.
 bool TurnsText(std::string_view character) {
   if (character == "\xd8\x9c") return true;  // U+061C
   if (character.size() != 3 || character[0] != '\xe2') return false;
@@ -67,7 +66,7 @@ std::string Printable(const std::string& bytes, size_t longest) {
     if (out.size() >= longest) return out + "…";
     const size_t size = Utf8CharacterSize(rest);
     const auto byte = static_cast<unsigned char>(rest[0]);
-    // U+0080 to U+009F are control characters too: terminals take U+009B for the beginning of a command.
+    // U+0080 to U+009F are control characters too: terminals treat U+009B as the start of a command.
     const bool control =
         byte < 0x20 || byte == 0x7f || (size == 2 && byte == 0xc2 && static_cast<unsigned char>(rest[1]) < 0xa0);
     const size_t shown = std::max<size_t>(1, size);

@@ -7,7 +7,7 @@
 
 namespace anchorsplat {
 
-// All arguments written one after the other: Cat("byte ", 17, ": bad").
+// Concatenates all arguments with operator<<: Cat("byte ", 17, ": bad").
 template <typename... Args>
 std::string Cat(const Args&... args) {
   std::ostringstream out;
@@ -17,9 +17,9 @@ std::string Cat(const Args&... args) {
 
 std::string WithThousands(int64_t n);         // 1,234,567
 std::string Fixed(double value, int digits);  // Fixed(3.14159, 2) = "3.14"; "inf", "nan" as such
-std::string HumanBytes(uint64_t bytes);       // "4.7 MB" (powers of 1000, as file managers show)
+std::string HumanBytes(uint64_t bytes);       // powers of 1000
 std::string HumanSeconds(double seconds);     // "850 ms", "12.3 s", "4 min 05 s"
 std::string Printable(const std::string& bytes,
-                      size_t longest = 60);  // for messages: control characters and what is no UTF-8 escaped
+                      size_t longest = 60);  // for messages: escapes control characters and invalid UTF-8
 
 }  // namespace anchorsplat

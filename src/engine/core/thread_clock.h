@@ -4,7 +4,7 @@
 
 namespace anchorsplat {
 
-// Processor time this thread has used, in seconds: differences say what a piece of work costs, whoever else is busy.
+// CPU time of the calling thread in seconds, which other load does not affect. Only differences have meaning.
 inline double ThreadSeconds() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);

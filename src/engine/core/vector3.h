@@ -6,8 +6,7 @@
 
 namespace anchorsplat {
 
-// Products and differences of two vectors of three, in their own precision. Sums from left to right, so that what is
-// made of them is the same everywhere.
+// Vectors of three, in their own precision. Sums run from left to right, so results are the same on every machine.
 
 template <typename T>
 T Dot(const T* a, const T* b) {

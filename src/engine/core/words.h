@@ -4,7 +4,7 @@
 
 namespace anchorsplat {
 
-// Lines of text files in words: blanks are spaces, tabs and carriage returns.
+// Splits lines of text files into words. Blanks are spaces, tabs and carriage returns.
 
 inline bool IsBlank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
 
@@ -14,7 +14,7 @@ inline std::string_view Trimmed(std::string_view text) {
   return text;
 }
 
-// Takes the first word off `line`, which is trimmed; empty when there is none.
+// Removes and returns the first word of `line` and trims the rest; empty if there is none.
 inline std::string_view TakeWord(std::string_view& line) {
   line = Trimmed(line);
   size_t end = 0;

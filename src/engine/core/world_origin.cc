@@ -47,16 +47,16 @@ WorldOrigin OriginNear(const Point& middle, double detail) {
   if (!(fine_up_to > 0) || !std::isfinite(fine_up_to) || std::ranges::all_of(middle, is_near)) return {};
   const double round = std::pow(10.0, std::floor(std::log10(fine_up_to)));
   WorldOrigin origin{};
-  // Adding zero makes −0 to 0.
+  // Adding zero turns −0 into 0.
   for (size_t axis = 0; axis < 3; ++axis) origin[axis] = std::round(middle[axis] / round) * round + 0.0;
-  // What no text says would be a file that nobody reads.
+  // An origin that TextOf cannot write would make an unreadable file.
   const bool can_be_said = std::ranges::all_of(origin, [](double x) { return std::abs(x) <= kFarthestOrigin; });
   return can_be_said ? origin : WorldOrigin{};
 }
 
 }  // namespace
 
-std::array<double, 3> FromOrigin(const Point& point, const WorldOrigin& origin) {
+std::array<double, 3> RelativeToOrigin(const Point& point, const WorldOrigin& origin) {
   return {point[0] - origin[0], point[1] - origin[1], point[2] - origin[2]};
 }
 

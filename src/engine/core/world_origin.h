@@ -10,36 +10,33 @@
 
 namespace anchorsplat {
 
-// World coordinates in double, means in float: a splat's world position is origin + mean. The origin is zero unless the
-// coordinates are so large beside the splat's detail that floats would be too coarse for them, as those of maps are.
-// Cameras, regions and everything that people say are world coordinates.
+// Origin of a splat's means: world position (double) = origin + mean (float). It is zero unless coordinates are so
+// large compared to the splat's detail, as in maps, that floats would be too coarse. Cameras, regions and all user
+// input are in world coordinates.
 using WorldOrigin = std::array<double, 3>;  // world units
 
 inline bool IsZero(const WorldOrigin& origin) { return origin[0] == 0 && origin[1] == 0 && origin[2] == 0; }
 
-// `point` as seen from the origin, and back.
-std::array<double, 3> FromOrigin(const std::array<double, 3>& point, const WorldOrigin& origin);
+// Conversions between world coordinates and coordinates relative to the origin.
+std::array<double, 3> RelativeToOrigin(const std::array<double, 3>& point, const WorldOrigin& origin);
 std::array<double, 3> ToWorld(const float* mean, const WorldOrigin& origin);
 
-// An origin for points in world units, [M,3], of which nothing smaller than `detail` matters: near their middle, in
-// round numbers. Zero where floats are fine enough at that distance: their steps there are below a 256th of `detail`.
-// Points that are not finite do not count.
+// Chooses an origin, in round numbers near the middle of `points` ([M,3], world units), for a smallest relevant size of
+// `detail`. Zero if floats suffice there: their spacing is below detail / 256. Points that are not finite are ignored.
 WorldOrigin ChooseOrigin(std::span<const double> points, double detail);
-// The same where only the points say how large things are: 128 details are the median distance from their middle. For
-// the centres of cameras; fewer than two say nothing.
+// The same with detail = median distance from the middle / 128, for camera centres. Zero for fewer than two points.
 WorldOrigin ChooseOrigin(std::span<const double> points);
 
-// "500000 4500000 120": as short as reads back the same. Nothing for other than three finite numbers up to 1e15, beyond
-// which doubles are too coarse as well.
+// Origin as text, "500000 4500000 120", in the fewest digits that read back the same. The inverse accepts only three
+// finite numbers up to 1e15, beyond which doubles are too coarse as well.
 std::string TextOf(const WorldOrigin& origin);
 std::optional<WorldOrigin> OriginOf(std::string_view text);
 
-// The comment by which a file of ours says the origin of its means, and what such a comment says; nothing where it is
-// none, or a broken one.
+// The comment that records an origin in our files, and its inverse; none for other or malformed comments.
 std::string OriginComment(const WorldOrigin& origin);
 std::optional<WorldOrigin> OriginOfComment(std::string_view comment);
-bool IsOriginComment(std::string_view comment);  // broken or not
-// Takes such comments out of the others. Zero where there is none; of several the last one counts.
+bool IsOriginComment(std::string_view comment);  // malformed or not
+// Removes origin comments and returns the last origin; zero if there is none.
 WorldOrigin TakeOrigin(std::vector<std::string>& comments);
 
 }  // namespace anchorsplat

@@ -82,7 +82,7 @@ TEST(WorldOrigin, CamerasSeeTheSameFromIt) {
   const WorldOrigin origin = {500000, 4500000, 100};
   for (const Camera& camera : orbit->cameras) {
     const auto in_world = camera.ToCamera({500001, 4499999, 121});
-    const auto from_origin = FromOrigin(camera, origin).ToCamera({1, -1, 21});
+    const auto from_origin = RelativeToOrigin(camera, origin).ToCamera({1, -1, 21});
     for (size_t k = 0; k < 3; ++k) EXPECT_NEAR(in_world[k], from_origin[k], 1e-8);
   }
 }

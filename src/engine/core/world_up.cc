@@ -19,7 +19,7 @@ std::optional<Vec3> WorldUp(std::span<const Camera> cameras) {
   for (const Camera& camera : cameras) {
     for (size_t k = 0; k < 3; ++k) sum[k] -= camera.world_to_camera.rotation[3 + k];  // its y points down
   }
-  // Cameras held every way have no up in common.
+  // Cameras held in all directions have no common up.
   const std::optional<Vec3> mean = UnitVector(sum, 0.1 * static_cast<double>(cameras.size()));
   if (!mean) return std::nullopt;
   size_t largest = 0;
@@ -36,7 +36,7 @@ void TurnUp(const Vec3& target, const Vec3& up, std::vector<Camera>& cameras) {
   const std::optional<Vec3> unit = UnitVector(up, 0);
   if (!unit || *unit == Vec3{0, 1, 0}) return;
   const Vec3& y = *unit;
-  // The columns of the rotation: where x, y and z go. x stays as near to itself as it can.
+  // Columns of the rotation: the images of x, y and z. x moves as little as possible.
   const Vec3 start = std::abs(y[0]) < 0.9 ? Vec3{1, 0, 0} : Vec3{0, 0, 1};
   const double along = Dot(start, y);
   const Vec3 x = *UnitVector({start[0] - along * y[0], start[1] - along * y[1], start[2] - along * y[2]}, 0);

@@ -89,7 +89,7 @@ std::string Found(const std::string& text) { return Cat(", found '", Printable(t
 
 // Of a matrix that takes vectors along some axes to RDF.
 Vec3 Times(const Matrix& m, const Vec3& v) { return Similarity{m, {}, 1}.Apply(v); }
-Matrix Times(const Matrix& a, const Matrix& b) { return After({a, {}, 1}, {b, {}, 1}).rotation; }
+Matrix Times(const Matrix& a, const Matrix& b) { return Compose({a, {}, 1}, {b, {}, 1}).rotation; }
 
 // Exact for quarters of a turn.
 std::pair<double, double> SineAndCosine(double degrees) {

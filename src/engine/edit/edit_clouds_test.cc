@@ -53,7 +53,7 @@ void ExpectSame(const GaussianCloud& a, const GaussianCloud& b) {
 
 TEST(EditClouds, GivesTheBitsOfFiles) {
   const TestFolder folder;
-  GaussianCloud a = TroubledCloud(9'001, 2), b = SplatOf(5'003, 1, 5);
+  GaussianCloud a = CloudWithNonFinite(9'001, 2), b = SplatOf(5'003, 1, 5);
   a.origin = {1000, 2000, 30};
   a.comments = {"credit: somebody"};
   b.comments = {"world up: 0 0 1"};

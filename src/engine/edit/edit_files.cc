@@ -177,7 +177,7 @@ std::vector<int64_t> PlacesOfBlocks(const EditedSplat& splat, int64_t begin) {
 
 void DropPlaces(std::span<EditedSplat> splats) {
   for (EditedSplat& splat : splats) {
-    if (!(splat.world == Similarity{})) DropSpzPlaces(splat.name, splat.comments);
+    if (!(splat.world == Similarity{})) DropSpzGeoreference(splat.name, splat.comments);
   }
 }
 
@@ -195,12 +195,12 @@ Result<EditReport> EditFiles(const EditJob& job, const std::filesystem::path& ou
     ANCHORSPLAT_ASSIGN_OR_RETURN(OpenedSplat file, OpenedSplat::Open(input.path, job.convert.input_format));
     files.push_back(std::move(file));
   }
-  if (!job.dry_run) ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(output));
+  if (!job.dry_run) ANCHORSPLAT_RETURN_IF_ERROR(CheckNotInput(output));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<PlyInput> inputs,
                                StreamableInputs(job, output, files, kept != nullptr));
   if (!inputs.empty()) return EditStreams(job, output, files, inputs);
   return EditInMemory(job, output, *to, files, kept);
-} catch (const NoDiskRoom& none) {
+} catch (const DiskFull& none) {
   return Error{ErrorCode::kIo, Cat(output.string(), ": ", none.what())};
 } catch (const std::bad_alloc&) {
   return Error{ErrorCode::kIo, Cat(output.string(), ": there is not enough memory for its Gaussians")};

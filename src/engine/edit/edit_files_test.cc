@@ -67,7 +67,7 @@ GaussianCloud ReadOf(const std::filesystem::path& path, ExtraProperties* extras 
 
 TEST(EditFiles, StreamsGiveTheSameBitsAsMemory) {
   const TestFolder folder;
-  GaussianCloud a = TroubledCloud(9'001, 3), b = Splat(5'003, 1, 5);
+  GaussianCloud a = CloudWithNonFinite(9'001, 3), b = Splat(5'003, 1, 5);
   a.origin = {1000, 2000, 30};
   b.comments = {"world up: 0 0 1", "credit: somebody"};
   const auto one = WithLabels(folder, "a.ply", a), two = WithLabels(folder, "b.ply", b, false);

@@ -46,7 +46,7 @@ std::array<double, 9> ShortestTurn(const Vec3& from, const Vec3& to) {
 }
 
 void Move(const Similarity& map, EditedSplat& splat) {
-  splat.world = After(map, splat.world);
+  splat.world = Compose(map, splat.world);
   if (map.rotation != Similarity{}.rotation) TurnUpComments(map.rotation, splat.comments);
 }
 

@@ -37,7 +37,7 @@ void Move(const Similarity& map, GaussianCloud& cloud) {
 Camera Moved(const Camera& camera, const Similarity& map, bool mirrors) {
   Camera moved = camera;
   const Similarity from = {camera.world_to_camera.rotation, camera.world_to_camera.translation, 1};
-  Similarity to = After(from, Inverse(map));
+  Similarity to = Compose(from, Inverse(map));
   for (double& x : to.translation) x *= map.scale;  // the picture does not know how large the world is
   if (mirrors) {
     for (size_t k = 0; k < 3; ++k) to.rotation[k] = -to.rotation[k];
@@ -93,7 +93,7 @@ TEST(MovedRows, AreRoundedOnce) {
   // A chain of turns is one turn: 36 times 10° is none.
   const GaussianCloud cloud = SmallSplat(3);
   Similarity map;
-  for (int i = 0; i < 36; ++i) map = After(MapOf("--rotate", "0,0,10"), map);
+  for (int i = 0; i < 36; ++i) map = Compose(MapOf("--rotate", "0,0,10"), map);
   GaussianCloud moved = cloud;
   Move(map, moved);
   for (size_t i = 0; i < cloud.sh.size(); ++i)
@@ -120,7 +120,7 @@ TEST(MovedRows, MirroringTwiceChangesNoBit) {
 }
 
 TEST(MovedRows, WhatIsNoNumberStaysSo) {
-  GaussianCloud cloud = TroubledCloud(300, 3);
+  GaussianCloud cloud = CloudWithNonFinite(300, 3);
   const GaussianCloud before = cloud;
   Move(MapOf("--rotate", "10,20,30"), cloud);
   for (int64_t i = 0; i < cloud.size(); ++i) {

@@ -117,7 +117,7 @@ Result<std::optional<RowTest>> RowTest::Of(const EditAction& action, const Simil
   test.origin_ = origin;
   test.sh_degree_ = sh_degree;
   if (value == nullptr) return std::optional(test);
-  test.world_ = After({.rotation = value->turn}, world);
+  test.world_ = Compose({.rotation = value->turn}, world);
   const std::string_view name = value->property;
   const int64_t harmonics = 3 * (ShCoefficients(sh_degree) - 1);
   if (name.size() == 1 && std::string_view("xyz").find(name[0]) != std::string_view::npos) {

@@ -152,7 +152,7 @@ Status CheckPixelOptions(const EnhanceOptions& options) {
 Result<Reading> ReadInside(const Region& region, const GaussianCloud& cloud, const ReadingModel& model) {
   std::vector<int64_t> inside;
   for (int64_t i = 0; i < cloud.size(); ++i) {
-    if (region.Holds(cloud.means.data() + 3 * i)) inside.push_back(i);
+    if (region.Contains(cloud.means.data() + 3 * i)) inside.push_back(i);
   }
   if (inside.empty()) return Read(cloud, model);  // which is refused later on
   ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud part, Subset(cloud, inside));

@@ -31,7 +31,8 @@ Status Clean(const EnhanceOptions& options, GaussianCloud& cloud, EnhanceReport&
       options.background.value_or(set.background.value_or(BackgroundOf(cloud.comments).value_or(unseen.background)));
   ANCHORSPLAT_ASSIGN_OR_RETURN(report.cleaned, FindUnseen(cloud, set.cameras, unseen));
   if (options.region) {
-    std::erase_if(report.cleaned->rows, [&](int64_t i) { return !options.region->Holds(cloud.means.data() + 3 * i); });
+    std::erase_if(report.cleaned->rows,
+                  [&](int64_t i) { return !options.region->Contains(cloud.means.data() + 3 * i); });
   }
   const UnseenGaussians& found = *report.cleaned;
   const auto count = static_cast<int64_t>(found.rows.size());

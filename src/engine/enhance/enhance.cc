@@ -298,8 +298,8 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   const bool double_means = std::exchange(cloud.double_means, false);
   EnhanceOptions from_origin = options;
   from_origin.refine.origin = origin;
-  if (options.cameras) from_origin.cameras = FromOrigin(*options.cameras, origin);
-  if (options.region) from_origin.region = FromOrigin(*options.region, origin);
+  if (options.cameras) from_origin.cameras = RelativeToOrigin(*options.cameras, origin);
+  if (options.region) from_origin.region = RelativeToOrigin(*options.region, origin);
   ANCHORSPLAT_ASSIGN_OR_RETURN(Enhanced enhanced, EnhanceFromOrigin(std::move(cloud), from_origin));
   enhanced.cloud.origin = origin;
   enhanced.cloud.double_means = double_means;

@@ -24,7 +24,7 @@ Result<GaussianCloud> SetRestAside(const EnhanceOptions& options, EnhanceInput& 
   std::vector<int64_t> outside;
   input.inside.resize(static_cast<size_t>(n));
   for (int64_t i = 0; i < n; ++i) {
-    const bool holds = options.region->Holds(input.cloud.means.data() + 3 * i);
+    const bool holds = options.region->Contains(input.cloud.means.data() + 3 * i);
     input.inside[static_cast<size_t>(i)] = holds ? 1 : 0;
     if (!holds) outside.push_back(i);
   }

@@ -32,7 +32,7 @@ void ExpectSameBits(const GaussianCloud& a, const GaussianCloud& b) {
 GaussianCloud Part(const GaussianCloud& cloud, const Region& region, bool inside) {
   std::vector<int64_t> rows;
   for (int64_t i = 0; i < cloud.size(); ++i) {
-    if (region.Holds(cloud.means.data() + 3 * i) == inside) rows.push_back(i);
+    if (region.Contains(cloud.means.data() + 3 * i) == inside) rows.push_back(i);
   }
   return Subset(cloud, rows).value();
 }
@@ -48,13 +48,13 @@ const Region kHalf{.low = {-100, -100, -100}, .high = {100, 0, 100}};
 TEST(Region, HoldsWhatLiesInItOrOnItsBorder) {
   const Region box{.low = {0, 1, 2}, .high = {1, 2, 3}}, sphere{.low = {0, 0, 1}, .high = {}, .radius = 2};
   const std::vector<std::array<float, 3>> in_box = {{0, 1, 2}, {1, 2, 3}, {0.5f, 1.5f, 2.5f}};
-  for (const auto& p : in_box) EXPECT_TRUE(box.Holds(p.data()));
+  for (const auto& p : in_box) EXPECT_TRUE(box.Contains(p.data()));
   const std::vector<std::array<float, 3>> out = {{1.1f, 1, 2}, {0, 0.9f, 2}, {0, 1, 3.1f}, {NAN, 1.5f, 2.5f}};
-  for (const auto& p : out) EXPECT_FALSE(box.Holds(p.data()));
+  for (const auto& p : out) EXPECT_FALSE(box.Contains(p.data()));
   const std::array<float, 3> border = {0, 0, 3}, beyond = {1.5f, 1.5f, 1}, none = {0, NAN, 0};
-  EXPECT_TRUE(sphere.Holds(border.data()));
-  EXPECT_FALSE(sphere.Holds(beyond.data()));
-  EXPECT_FALSE(sphere.Holds(none.data()));
+  EXPECT_TRUE(sphere.Contains(border.data()));
+  EXPECT_FALSE(sphere.Contains(beyond.data()));
+  EXPECT_FALSE(sphere.Contains(none.data()));
 }
 
 class EnhanceRegion : public Refinement {};

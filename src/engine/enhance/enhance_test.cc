@@ -152,8 +152,8 @@ TEST_F(EnhanceDoor, FromAnOriginIsTheSame) {
   GaussianCloud far = Ball(0.01);
   far.origin = origin;
   far.double_means = true;
-  options.cameras = FromOrigin(*options.cameras, back);
-  options.region = FromOrigin(*options.region, back);
+  options.cameras = RelativeToOrigin(*options.cameras, back);
+  options.region = RelativeToOrigin(*options.region, back);
   const auto from_origin = Enhance(far, options);
   ASSERT_TRUE(from_origin.ok()) << from_origin.error().message;
   EXPECT_EQ(from_origin->cloud.origin, origin);

@@ -57,7 +57,7 @@ EnlargedTargets::EnlargedTargets(RefineTargets low, std::shared_ptr<Upscaler> up
       upscaler_(std::move(upscaler)),
       factor_(factor),
       start_(std::move(start)),
-      still_(std::make_unique<StillCloud>(*start_)),
+      still_(std::make_unique<ConstantCloud>(*start_)),
       render_(render),
       kept_(low_.views().size()) {
   int64_t left = kBudget;

@@ -11,8 +11,8 @@
 #include "core/image.h"
 #include "core/result.h"
 #include "enhance/refine_targets.h"
+#include "render/constant_cloud.h"
 #include "render/rasterizer.h"
-#include "render/still_cloud.h"
 #include "upscale/upscaler.h"
 
 namespace anchorsplat {
@@ -60,7 +60,7 @@ class EnlargedTargets {
   std::shared_ptr<Upscaler> upscaler_;
   int factor_;
   std::shared_ptr<const GaussianCloud> start_;
-  std::unique_ptr<StillCloud> still_;  // of start_
+  std::unique_ptr<ConstantCloud> still_;  // of start_
   RenderOptions render_;
   std::vector<Camera> views_;
   std::vector<Kept> kept_;

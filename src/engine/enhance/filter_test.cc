@@ -118,7 +118,7 @@ TEST(Filter, ZeroHugeTinyAndBrokenRows) {
                       -3,
                       -3,
                       -3,  // broken mean
-                      kLargestLogScale,
+                      kMaxLogScale,
                       -3e38f,
                       0};  // at the ends of what is drawn
   cloud.means[9] = kInfinity;
@@ -131,7 +131,7 @@ TEST(Filter, ZeroHugeTinyAndBrokenRows) {
   EXPECT_NEAR(cloud.log_scales[4], 0.5 * std::log(added), 1e-6);
   EXPECT_TRUE(std::isnan(cloud.log_scales[6]));
   EXPECT_EQ(cloud.log_scales[9], -3);
-  EXPECT_EQ(cloud.log_scales[12], kLargestLogScale);
+  EXPECT_EQ(cloud.log_scales[12], kMaxLogScale);
   EXPECT_TRUE(std::isfinite(cloud.log_scales[13]));
 }
 

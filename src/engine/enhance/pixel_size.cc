@@ -59,7 +59,7 @@ Result<CameraPixelSizes> PixelSizesFromCameras(const GaussianCloud& cloud, const
     return Error{ErrorCode::kBadArgument, Cat("training width ", *train_width, " is not a number of pixels")};
   }
   std::vector<View> views;
-  const RenderOptions shown = OptionsFor(cloud);
+  const RenderOptions shown = DisplayOptions(cloud);
   for (const Camera& camera : cameras.cameras) views.push_back(MakeView(camera, shown, train_width));
 
   CameraPixelSizes out;

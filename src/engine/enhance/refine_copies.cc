@@ -6,8 +6,8 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "enhance/refine_poses.h"
+#include "render/constant_cloud.h"
 #include "render/rasterizer.h"
-#include "render/still_cloud.h"
 
 namespace anchorsplat {
 
@@ -22,7 +22,7 @@ Result<ViewDensity> MeasureDensity(const GaussianCloud& cloud, const RenderOptio
   ViewDensity density;
   const std::vector<Camera> views = Thinned(cameras, kDensityViews);
   Rasterizer rasterizer;
-  StillCloud still(cloud);
+  ConstantCloud still(cloud);
   const auto add = [&](size_t at, const RenderOutput& output) -> Status {
     const Camera& view = views[at];
     const auto shown = [](float alpha) { return alpha >= kShown; };

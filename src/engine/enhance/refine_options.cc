@@ -85,7 +85,7 @@ Status Validate(const RefineOptions& o) {
   if (o.seconds && !(*o.seconds > 0 && std::isfinite(*o.seconds))) return bad("seconds must be positive");
   if (o.copies && (*o.copies < 1 || *o.copies > kMostCopies)) return bad(Cat("K must be 1 to ", kMostCopies));
   if (o.max_gaussians < 0) return bad("the bound of Gaussians must not be negative");
-  if (o.downscale < 1 || o.downscale > kMostDownscale) return bad(Cat("downscale must be 1 to ", kMostDownscale));
+  if (o.downscale < 1 || o.downscale > kMaxDownscale) return bad(Cat("downscale must be 1 to ", kMaxDownscale));
   if (o.hold_out && *o.hold_out < 0) return bad("hold-out must not be negative");
   if (o.poses < 1) return bad("there must be at least one pose");
   if (o.between < 0) return bad("poses between cameras must not be negative");

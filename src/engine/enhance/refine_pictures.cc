@@ -10,8 +10,8 @@
 #include "core/text.h"
 #include "enhance/refine_targets.h"
 #include "metrics/image_metrics.h"
+#include "render/constant_cloud.h"
 #include "render/rasterizer.h"
-#include "render/still_cloud.h"
 
 namespace anchorsplat {
 
@@ -59,7 +59,7 @@ double PsnrMoved(const Image& shown, const Image& truth, int dx, int dy) {
 
 // By how many dB the picture is nearer to the splat when it is moved by a pixel, or when the camera's focal length is
 // another, by so much that borders move as far; 0 at least.
-Result<double> GainElsewhere(StillCloud& cloud, Rasterizer& rasterizer, const RenderOptions& render,
+Result<double> GainElsewhere(ConstantCloud& cloud, Rasterizer& rasterizer, const RenderOptions& render,
                              const Camera& camera, const Image& shown, const Image& truth) {
   if (std::min(truth.width, truth.height) < kLeastSide) return 0.0;
   const double own = PsnrMoved(shown, truth, 0, 0);
@@ -104,7 +104,7 @@ Camera Halved(const Camera& camera) {
 }
 
 // Fills in `smaller_psnr` and `smaller`. `cameras` and `pictures` become the last sizes that were looked at.
-Status MeasureSmaller(StillCloud& cloud, const RenderOptions& render, std::vector<Camera>& cameras,
+Status MeasureSmaller(ConstantCloud& cloud, const RenderOptions& render, std::vector<Camera>& cameras,
                       std::vector<Image>& pictures, PictureAgreement& agreement) {
   Rasterizer rasterizer;
   for (int part = 2;; part *= 2) {
@@ -133,7 +133,7 @@ Result<PictureAgreement> MeasureAgreement(const GaussianCloud& cloud, const Rend
   const auto count = static_cast<int64_t>(pictures.views().size());
   PictureAgreement agreement;
   agreement.views = std::min(count, kMostViews);
-  StillCloud still(cloud);
+  ConstantCloud still(cloud);
   Rasterizer rasterizer;
   RenderOutput output;
   std::vector<Image> shown, truth;

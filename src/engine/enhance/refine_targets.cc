@@ -69,7 +69,7 @@ RefineTargets::~RefineTargets() = default;
 RefineTargets::RefineTargets(std::shared_ptr<const GaussianCloud> splat, const RenderOptions& render,
                              std::vector<Camera> views)
     : splat_(std::move(splat)),
-      still_(std::make_unique<StillCloud>(*splat_)),
+      still_(std::make_unique<ConstantCloud>(*splat_)),
       render_(render),
       views_(std::move(views)),
       kept_(views_.size()) {}

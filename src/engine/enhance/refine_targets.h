@@ -12,8 +12,8 @@
 #include "core/image.h"
 #include "core/result.h"
 #include "fit/picture_cache.h"
+#include "render/constant_cloud.h"
 #include "render/rasterizer.h"
-#include "render/still_cloud.h"
 
 namespace anchorsplat {
 
@@ -64,7 +64,7 @@ class RefineTargets {
   Image whole_;
 
   std::shared_ptr<const GaussianCloud> splat_;
-  std::unique_ptr<StillCloud> still_;  // of it
+  std::unique_ptr<ConstantCloud> still_;  // of it
   RenderOptions render_;
   std::vector<Camera> views_;
   std::vector<RefineTarget> kept_;  // of whole pictures; empty ones are not there yet

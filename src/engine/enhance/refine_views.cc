@@ -18,8 +18,8 @@
 #include "fit/view_exposure.h"
 #include "fit/view_pose.h"
 #include "metrics/image_metrics.h"
+#include "render/constant_cloud.h"
 #include "render/shown_range.h"
-#include "render/still_cloud.h"
 
 namespace anchorsplat {
 
@@ -94,7 +94,7 @@ Result<RefineViews> OpenSplat(const RefineInput& input, const RefineOptions& opt
         poses, RefinePosesAround(input.cloud, input.pixel_size, options.poses, kCheckViews, input.seed));
   }
   for (const Camera& camera : poses.check) {
-    const std::string warning = NothingToSee(input.cloud, camera, render, std::nullopt);
+    const std::string warning = EmptyPictureReason(input.cloud, camera, render, std::nullopt);
     if (warning.empty()) continue;
     LogWarning(Cat(warning, " Refinement cannot use such views"));
     break;
@@ -108,7 +108,7 @@ Result<RefineViews> OpenSplat(const RefineInput& input, const RefineOptions& opt
 }  // namespace
 
 Result<RefineViews> OpenRefineViews(const RefineInput& input, const RefineOptions& options) {
-  const RenderOptions render = OptionsFor(input.cloud);
+  const RenderOptions render = DisplayOptions(input.cloud);
   return options.images.empty() ? OpenSplat(input, options, render) : OpenPictures(input, options, render);
 }
 
@@ -126,7 +126,7 @@ Status EnlargeViews(const std::filesystem::path& file, int factor, const Gaussia
 Result<Consistency> MeasureConsistency(const GaussianCloud& cloud, double upscale, const GaussianCloud& input,
                                        const RefineOptions& options, RefineViews& views) {
   RefineTargets& targets = views.check;
-  StillCloud still(cloud);
+  ConstantCloud still(cloud);
   ViewObjective objective;
   PoseAligner aligner;
   RefineTarget target;
@@ -172,7 +172,7 @@ Result<std::vector<double>> Residuals(const GaussianCloud& cloud, double upscale
   RenderOptions render = RaysOf(one_ray, views.render);
   render.gradient = true;
 
-  StillCloud still(cloud);
+  ConstantCloud still(cloud);
   Rasterizer rasterizer;
   RenderOutput output;
   RenderGradient off;

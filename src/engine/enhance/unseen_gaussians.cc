@@ -18,9 +18,9 @@
 #include "core/spherical_harmonics.h"
 #include "core/text.h"
 #include "metrics/image_metrics.h"
+#include "render/constant_cloud.h"
 #include "render/rasterizer.h"
 #include "render/shown_range.h"
-#include "render/still_cloud.h"
 
 namespace anchorsplat {
 
@@ -106,7 +106,7 @@ Result<Shown> FindShown(CloudView cloud, const std::vector<int64_t>& rows, const
   Shown shown{.additions = std::vector<double>(rows.size(), -1.0),
               .reaches = std::vector<double>(rows.size()),
               .footprints = std::vector<double>(rows.size())};
-  StillCloud still(cloud);
+  ConstantCloud still(cloud);
   Rasterizer rasterizer;
   RenderOutput output;
   RenderGradient signs;
@@ -119,7 +119,7 @@ Result<Shown> FindShown(CloudView cloud, const std::vector<int64_t>& rows, const
     signs.color = output.color;
     signs.box = {0, 0, camera.intrinsics.width, camera.intrinsics.height};
     for (float& sign : signs.color.pixels) sign = random.Below(2) == 0 ? -1.0f : 1.0f;
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const SeenGradient gradient, rasterizer.BackwardToSeen(cloud, signs));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const AppearanceGradient gradient, rasterizer.BackwardToAppearance(cloud, signs));
     ParallelFor(0, std::ssize(rows), kRowsAtOnce, [&](int64_t first, int64_t last) {
       for (auto k = static_cast<size_t>(first); k < static_cast<size_t>(last); ++k) {
         const int64_t i = rows[k];
@@ -171,7 +171,7 @@ class Comparison {
   Status Render(const std::function<Status(size_t, RenderOutput&)>& use) {
     CloudView view(*cloud_);
     view.opacity_logits = logits_;
-    StillCloud still(view);
+    ConstantCloud still(view);
     return rasterizer_.RenderEach(still, views_, options_, [&](size_t k, RenderOutput& output) -> Status {
       if (StopRequested()) return Stopped();
       Clamp01(output.color);
@@ -234,7 +234,7 @@ Result<UnseenGaussians> FindUnseen(const GaussianCloud& cloud, const std::vector
     }
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views, ChooseViews(cloud, cameras));
-  RenderOptions render = OptionsFor(cloud);
+  RenderOptions render = DisplayOptions(cloud);
   render.background = options.background;
   const std::vector<int64_t> like = RowsLikeBackground(cloud, cloud.sh, cloud.sh_stride(), options.background);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Shown shown, FindShown(cloud, like, views, render, options.seed));
@@ -293,7 +293,7 @@ Result<std::vector<int64_t>> PredictUnseen(const GaussianCloud& cloud) {
   CloudView view(cloud);
   view.sh_degree = 0;
   view.sh = colours;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Shown shown, FindShown(view, dark, views, OptionsFor(cloud), /*seed=*/0));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Shown shown, FindShown(view, dark, views, DisplayOptions(cloud), /*seed=*/0));
   std::vector<size_t> order = Candidates(shown);
   // Most of a large splat is behind something: it adds nothing to the sum and would go out again below.
   std::erase_if(order, [&](size_t k) { return shown.additions[k] == 0 && shown.IsHidden(k); });

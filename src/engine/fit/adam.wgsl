@@ -7,10 +7,10 @@ struct Adam {
   first_columns: u32,  // of these that learn at first_rate
   first_rate: f32,     // both corrected (render/adam_runs.h)
   rate: f32,
-  take1: f32,
-  keep2: f32,
-  take2: f32,
-  inverse_root: f32,
+  one_minus_beta1: f32,
+  beta2: f32,
+  one_minus_beta2: f32,
+  inverse_correction2: f32,
   epsilon: f32,
 }
 
@@ -28,9 +28,9 @@ struct Adam {
   if (row >= adam.rows) { return; }
   let i = row * adam.stride + column;
   let g = gradient[i];
-  let m = fma(adam.take1, g - first_moment[i], first_moment[i]);
-  let v = fma(adam.take2 * g, g, adam.keep2 * second_moment[i]);
-  let denominator = fma(sqrt(v), adam.inverse_root, adam.epsilon);
+  let m = fma(adam.one_minus_beta1, g - first_moment[i], first_moment[i]);
+  let v = fma(adam.one_minus_beta2 * g, g, adam.beta2 * second_moment[i]);
+  let denominator = fma(sqrt(v), adam.inverse_correction2, adam.epsilon);
   first_moment[i] = m;
   second_moment[i] = v;
   values[i] = fma(-select(adam.rate, adam.first_rate, column < adam.first_columns), m / denominator, values[i]);

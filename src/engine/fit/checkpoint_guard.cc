@@ -107,7 +107,7 @@ Status CompareSettings(const std::string& file, const std::string& theirs, const
 
 Status CheckCheckpoint(const fs::path& checkpoint, std::span<const fs::path> outputs, bool resume, bool overwrite,
                        const std::function<bool(const fs::path&)>& is_checkpoint) {
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(checkpoint));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckNotInput(checkpoint));
   for (const fs::path& output : outputs) {
     if (!output.empty() && SamePlace(output, checkpoint)) {
       return Error{ErrorCode::kBadArgument, Cat("--checkpoint ", checkpoint.string(), ": is the output itself")};

@@ -28,7 +28,7 @@ std::string FingerprintOf(const std::vector<Camera>& cameras, double scene_scale
     if (photograph.orientation != 1 || photograph.downscale != 1) {
       print.Add(std::array{photograph.orientation, photograph.downscale});
     }
-    if (photograph.lens.IsStraight()) continue;
+    if (photograph.lens.IsIdentity()) continue;
     const Pinhole& b = photograph.intrinsics;
     print.Add(std::array{b.fx, b.fy, b.cx, b.cy, static_cast<double>(b.width), static_cast<double>(b.height)});
     print.Add(std::array{static_cast<int>(photograph.lens.model)});

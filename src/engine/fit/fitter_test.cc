@@ -134,7 +134,7 @@ TEST_F(Fits, MapsAreFittedAsWellAsWhatLiesAtZero) {
     return sum;
   };
   const double at_zero = psnr();
-  for (Camera& camera : set.cameras) camera = FromOrigin(camera, {-place[0], -place[1], -place[2]});
+  for (Camera& camera : set.cameras) camera = RelativeToOrigin(camera, {-place[0], -place[1], -place[2]});
   ASSERT_TRUE(WriteTransforms(folder / "transforms.json", set, {.overwrite = true}).ok());
   EXPECT_NEAR(psnr(), at_zero, 0.5);
 }

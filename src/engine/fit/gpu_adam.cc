@@ -12,7 +12,7 @@ const GpuKernel kAdamStep = {"adam_step", {wgsl::kAdamWgsl}};
 // `Adam` of adam.wgsl.
 struct AdamParameters {
   uint32_t rows, stride, columns, first_columns;
-  float first_rate, rate, take1, keep2, take2, inverse_root, epsilon;
+  float first_rate, rate, one_minus_beta1, beta2, one_minus_beta2, inverse_correction2, epsilon;
   uint32_t unused;
 };
 
@@ -27,10 +27,10 @@ void RecordAdamStep(const GpuAdamParams& p, GpuDevice& device) {
   parameters.first_columns = static_cast<uint32_t>(p.first_columns);
   parameters.first_rate = CorrectedRate(static_cast<float>(p.first_rate), p.beta1, p.step);
   parameters.rate = CorrectedRate(static_cast<float>(p.rate), p.beta1, p.step);
-  parameters.take1 = numbers.take1;
-  parameters.keep2 = numbers.keep2;
-  parameters.take2 = numbers.take2;
-  parameters.inverse_root = numbers.inverse_root;
+  parameters.one_minus_beta1 = numbers.one_minus_beta1;
+  parameters.beta2 = numbers.beta2;
+  parameters.one_minus_beta2 = numbers.one_minus_beta2;
+  parameters.inverse_correction2 = numbers.inverse_correction2;
   parameters.epsilon = numbers.epsilon;
   parameters.rows = static_cast<uint32_t>(p.rows);
   const uint64_t row_bytes = static_cast<uint64_t>(p.stride) * sizeof(float);
@@ -41,7 +41,7 @@ void RecordAdamStep(const GpuAdamParams& p, GpuDevice& device) {
               {2, p.first_moment, offset, bytes},
               {3, p.second_moment, offset, bytes},
               {4, p.values, offset, bytes}},
-             GpuGroups(p.rows * p.columns));
+             GpuWorkgroups(p.rows * p.columns));
 }
 
 }  // namespace anchorsplat

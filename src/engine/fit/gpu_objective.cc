@@ -56,17 +56,17 @@ Result<bool> GpuObjective::Show(const ObjectiveOptions& options, GpuCloud& cloud
   const int64_t plane = int64_t{width_} * height_;
   if (samples_ > 1) {
     ANCHORSPLAT_RETURN_IF_ERROR(
-        GpuRoom(*device_, averages_, static_cast<uint64_t>(plane) * 3 * sizeof(float), "averages of rays"));
+        EnsureGpuMemory(*device_, averages_, static_cast<uint64_t>(plane) * 3 * sizeof(float), "averages of rays"));
   }
   const float near = NearPlane(render_, rays);
-  rays.world_to_camera = FromOrigin(rays.world_to_camera, origin);
+  rays.world_to_camera = RelativeToOrigin(rays.world_to_camera, origin);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const bool drawn, rasterizer_.Draw(cloud, rays, near, render_, nullptr));
   if (!drawn || samples_ == 1) return drawn;
   const RaysParameters p = {{static_cast<uint32_t>(width_), static_cast<uint32_t>(height_)},
                             static_cast<uint32_t>(samples_),
                             RasterizedPlane()};
   device_->Run(kAverageRays, AsParameters(p), {{1, rasterizer_.picture.get()}, {2, averages_.get()}},
-               GpuGroups(3 * plane));
+               GpuWorkgroups(3 * plane));
   return true;
 }
 
@@ -103,7 +103,7 @@ Result<GpuObjective::Target*> GpuObjective::RoomForTarget(uint64_t bytes, std::o
     }
     left_ = 0;  // what the rest needs comes first
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device_, passing_.memory, bytes, "a picture to compare with"));
+  ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device_, passing_.memory, bytes, "a picture to compare with"));
   return &passing_;
 }
 
@@ -128,7 +128,7 @@ Status GpuObjective::SetTarget(const Image& picture, const Buffer<uint8_t>& igno
     staging_.assign(values.begin(), values.end());
     const auto plane = static_cast<size_t>(picture.plane());
     for (size_t i = 0; i < staging_.size(); ++i) {
-      if (ignored[i % plane] != 0) staging_[i] = kNotAsked;
+      if (ignored[i % plane] != 0) staging_[i] = kIgnoredPixel;
     }
     values = staging_;
   }
@@ -139,14 +139,14 @@ Status GpuObjective::SetTarget(const Image& picture, const Buffer<uint8_t>& igno
 Result<const GpuBuffer*> GpuObjective::Unpack(const Target& target) {
   if (target.channels == 0) return &std::as_const(*target.memory);
   const int64_t plane = int64_t{width_} * height_;
-  ANCHORSPLAT_RETURN_IF_ERROR(
-      GpuRoom(*device_, unpacked_, static_cast<uint64_t>(plane) * 3 * sizeof(float), "a picture to compare with"));
+  ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device_, unpacked_, static_cast<uint64_t>(plane) * 3 * sizeof(float),
+                                              "a picture to compare with"));
   const UnpackParameters p = {target.background,
                               static_cast<uint32_t>(plane),
                               static_cast<uint32_t>(target.channels),
                               target.masked ? 1u : 0u,
                               {}};
-  device_->Run(kUnpackPicture, AsParameters(p), {{1, target.memory.get()}, {2, unpacked_.get()}}, GpuGroups(plane));
+  device_->Run(kUnpackPicture, AsParameters(p), {{1, target.memory.get()}, {2, unpacked_.get()}}, GpuWorkgroups(plane));
   return &std::as_const(*unpacked_);
 }
 
@@ -156,9 +156,9 @@ Status GpuObjective::Compare(const ObjectiveOptions& options, GpuCloud& cloud, i
   const auto rays = static_cast<uint32_t>(int64_t{plane} * samples_ * samples_);
   constexpr uint64_t kPixelBytes = 4 * sizeof(float);
   // New memory is 0, and the gradient of alpha, of which the loss knows nothing, stays it.
-  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device_, gradient_, plane * kPixelBytes, "the gradient of a picture"));
+  ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device_, gradient_, plane * kPixelBytes, "the gradient of a picture"));
   if (samples_ > 1) {
-    ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device_, rays_gradient_, rays * kPixelBytes, "the gradient of rays"));
+    ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device_, rays_gradient_, rays * kPixelBytes, "the gradient of rays"));
   }
   const auto kept = kept_.find(view);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const GpuBuffer* wanted, Unpack(kept == kept_.end() ? passing_ : kept->second));
@@ -167,7 +167,8 @@ Status GpuObjective::Compare(const ObjectiveOptions& options, GpuCloud& cloud, i
   if (samples_ > 1) {
     const RaysParameters p = {
         {static_cast<uint32_t>(width_), static_cast<uint32_t>(height_)}, static_cast<uint32_t>(samples_), 0};
-    device_->Run(kSpreadToRays, AsParameters(p), {{1, gradient_.get()}, {2, rays_gradient_.get()}}, GpuGroups(rays));
+    device_->Run(kSpreadToRays, AsParameters(p), {{1, gradient_.get()}, {2, rays_gradient_.get()}},
+                 GpuWorkgroups(rays));
   }
   const GpuPictureGradient of_picture = {samples_ > 1 ? rays_gradient_.get() : gradient_.get(),
                                          {0, 0, width_ * samples_, height_ * samples_}};

@@ -45,7 +45,7 @@ int64_t CamerasThatSee(const Point& p, const std::vector<Camera>& cameras) {
 
 // Whether floats can hold it.
 bool AppendPosition(const Point& world, const WorldOrigin& origin, InitialPoints& points) {
-  const Point p = FromOrigin(world, origin);
+  const Point p = RelativeToOrigin(world, origin);
   if (!std::ranges::all_of(p, [](double x) { return std::isfinite(static_cast<float>(x)); })) return false;
   for (const double x : p) points.positions.push_back(static_cast<float>(x));
   return true;

@@ -70,7 +70,7 @@ void MipFilterBackward(const GaussianCloud& cloud, std::span<const float> sizes,
       const double logit = cloud.opacity_logits[i];
       // With k the kept part and o' = k·o:  ∂logit o'/∂logit o = (1 − o)/(1 − o'),  ∂logit o'/∂ln k = 1/(1 − o'),
       // ∂ln k/∂ln s = 1 − s²/s'²,  ∂ln s'/∂ln s = s²/s'².
-      const double left = smoothing.LeftOpen(logit);
+      const double left = smoothing.Transmittance(logit);
       if (!(left > 0)) continue;  // infinitely opaque, and so large that the filter takes nothing: it stays what it is
       const double g_logit = gradient.opacity_logits[i];
       gradient.opacity_logits[i] = static_cast<float>(g_logit * Sigmoid(-logit) / left);
@@ -90,7 +90,8 @@ void FuseMipFilter(std::span<const float> sizes, GaussianCloud& cloud) {
 void CapFilteredOpacities(std::span<const float> sizes, double opacity, GaussianCloud& cloud) {
   for (size_t i = 0; i < cloud.opacity_logits.size(); ++i) {
     double kept = 1;
-    if (sizes[i] > 0) kept = std::exp(SmoothingOf(cloud.log_scales.data() + 3 * i, double{sizes[i]}).log_kept);
+    if (sizes[i] > 0)
+      kept = std::exp(SmoothingOf(cloud.log_scales.data() + 3 * i, double{sizes[i]}).log_opacity_factor);
     if (!(opacity < kept)) continue;  // o' < k can be no more than that
     float& logit = cloud.opacity_logits[i];
     logit = std::min(logit, static_cast<float>(std::log(opacity / (kept - opacity))));

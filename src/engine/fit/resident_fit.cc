@@ -163,7 +163,7 @@ void ResidentFit::Gather(const ResidentStep& step, const GpuGradient& gradient) 
                {{1, step.absgrad ? gradient.means2d_abs.get() : gradient.means2d.get()},
                 {2, &objective_.radii(), first * kRadiiBytes, count * kRadiiBytes},
                 {3, gathered_.get(), first * kGatheredBytes, count * kGatheredBytes}},
-               GpuGroups(gradient.count));
+               GpuWorkgroups(gradient.count));
 }
 
 Status ResidentFit::ReadGathered(Densification::Gathered& gathered) const {
@@ -200,7 +200,7 @@ Result<RefinementPlan> ResidentFit::Plan(const DensificationOptions& options, in
                   {5, block.sh.get()},
                   {6, marks.get(), static_cast<uint64_t>(block.first) * sizeof(uint32_t),
                    static_cast<uint64_t>(block.count) * sizeof(uint32_t)}},
-                 GpuGroups(block.count));
+                 GpuWorkgroups(block.count));
     for (const Column& column : ColumnsOf(cloud_)) {
       if (column.values != &GaussianCloud::sh) reads.push_back(ReadOf(block, column, shapes_));
     }
@@ -225,7 +225,7 @@ void ResidentFit::TakeRows(const GpuBuffer& source, int64_t limit, const GpuClou
         p.from_count = static_cast<uint32_t>(old.count);
         device_->Run(kTakeRows, AsParameters(p),
                      {{1, &source}, {2, (old.*column.memory).get()}, {3, (fresh.*column.memory).get()}},
-                     GpuGroups(fresh.count * column.width));
+                     GpuWorkgroups(fresh.count * column.width));
       }
     }
   }
@@ -276,7 +276,7 @@ Status ResidentFit::Apply(const DensificationOptions& options, const RefinementP
       device_->Run(
           kPlaceNewcomers, AsParameters(p),
           {{1, newcomers.get()}, {2, block.means.get()}, {3, block.log_scales.get()}, {4, block.opacity_logits.get()}},
-          GpuGroups(block.count));
+          GpuWorkgroups(block.count));
     }
   }
   cloud_ = std::move(cloud);
@@ -291,7 +291,7 @@ void ResidentFit::ResetOpacities(double cap) {
   p.numbers[0] = static_cast<float>(std::log(cap / (1 - cap)));
   for (const GpuCloudBlock& block : cloud_.blocks()) {
     p.count = static_cast<uint32_t>(block.count);
-    device_->Run(kCapOpacities, AsParameters(p), {{1, block.opacity_logits.get()}}, GpuGroups(block.count));
+    device_->Run(kCapOpacities, AsParameters(p), {{1, block.opacity_logits.get()}}, GpuWorkgroups(block.count));
   }
   for (const GpuCloud* moments : {&first_, &second_}) {
     for (const GpuCloudBlock& block : moments->blocks()) {

@@ -11,7 +11,7 @@ struct Bytes {
 @group(0) @binding(1) var<storage, read> packed: array<u32>;        // u8 [channels + masked,H,W]
 @group(0) @binding(2) var<storage, read_write> wanted: array<f32>;  // [3,H,W]
 
-const NOT_ASKED = -1.0;
+const IGNORED_BELOW = -1.0;
 
 fn Byte(i: u32) -> u32 { return (packed[i / 4u] >> (8u * (i % 4u))) & 255u; }
 fn Part(i: u32) -> f32 { return f32(Byte(i)) * (1.0 / 255.0); }
@@ -26,7 +26,7 @@ fn Part(i: u32) -> f32 { return f32(Byte(i)) * (1.0 / 255.0); }
     let alpha = Part(3u * plane + pixel);
     color = color * alpha + bytes.background * (1.0 - alpha);
   }
-  if (bytes.masked != 0u && Byte(bytes.channels * plane + pixel) != 0u) { color = vec3f(NOT_ASKED); }
+  if (bytes.masked != 0u && Byte(bytes.channels * plane + pixel) != 0u) { color = vec3f(IGNORED_BELOW); }
   wanted[pixel] = color.x;
   wanted[plane + pixel] = color.y;
   wanted[2u * plane + pixel] = color.z;

@@ -146,7 +146,7 @@ void MoveToOrigin(const fs::path& source, const ProjectOptions& options, std::ve
     LogInfo(Cat(source.string(), ": coordinates exceed 32-bit floats; positions are stored relative to ",
                 TextOf(out.origin)));
   }
-  for (Camera& view : views) view = FromOrigin(std::move(view), out.origin);
+  for (Camera& view : views) view = RelativeToOrigin(std::move(view), out.origin);
   out.scene_scale = SceneScale(views);
 }
 
@@ -196,7 +196,7 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
       ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet test, ReadCameras(test_file, &missing));
       ANCHORSPLAT_ASSIGN_OR_RETURN(
           out.held_out, WithPictures(std::move(test), test_file, missing, options.downscale, out.without_picture));
-      for (Camera& view : out.held_out) view = FromOrigin(std::move(view), out.origin);
+      for (Camera& view : out.held_out) view = RelativeToOrigin(std::move(view), out.origin);
     } else {
       HoldOut(options.hold_out, std::move(views), out);
     }

@@ -30,7 +30,7 @@ struct ProjectOptions {
   // Views whose place in the order of names is a multiple of this are held out; 0: none are. Projects with a
   // transforms_test.json hold out those instead.
   int hold_out = 8;
-  int downscale = 1;  // pixels of a picture per side that become one, their mean; 1 to kMostDownscale
+  int downscale = 1;  // pixels of a picture per side that become one, their mean; 1 to kMaxDownscale
   std::optional<WorldOrigin> origin = {};  // of a splat that is there already; nothing: ChooseOrigin of the cameras
 };
 

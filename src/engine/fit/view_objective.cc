@@ -21,7 +21,7 @@ Status ViewObjective::Show(const ObjectiveOptions& options, const CloudView& clo
   return ShowCloud(options, /*gradient=*/true, cloud, camera);
 }
 
-Status ViewObjective::Show(const ObjectiveOptions& options, StillCloud& cloud, const Camera& camera) {
+Status ViewObjective::Show(const ObjectiveOptions& options, ConstantCloud& cloud, const Camera& camera) {
   return ShowCloud(options, /*gradient=*/false, cloud, camera);
 }
 

@@ -6,8 +6,8 @@
 #include "core/result.h"
 #include "fit/pixel_model.h"
 #include "metrics/photometric_loss.h"
+#include "render/constant_cloud.h"
 #include "render/rasterizer.h"
-#include "render/still_cloud.h"
 
 namespace anchorsplat {
 
@@ -36,7 +36,7 @@ class ViewObjective {
   // the options and the cloud of the last Show.
   Status Show(const ObjectiveOptions& options, const CloudView& cloud, const Camera& camera);
   // Only to look at.
-  Status Show(const ObjectiveOptions& options, StillCloud& cloud, const Camera& camera);
+  Status Show(const ObjectiveOptions& options, ConstantCloud& cloud, const Camera& camera);
   // `step`: that of Rasterizer::Backward.
   Result<PhotometricLossValue> Compare(const ObjectiveOptions& options, const CloudView& cloud, const Image& picture,
                                        CloudGradient& gradient, const CoefficientStep* step = nullptr);

@@ -6,7 +6,7 @@
 #include "core/log.h"
 #include "core/run_context.h"
 #include "metrics/image_metrics.h"
-#include "render/still_cloud.h"
+#include "render/constant_cloud.h"
 
 namespace anchorsplat {
 
@@ -39,7 +39,7 @@ Result<ViewQuality> MeasureQuality(const GaussianCloud& cloud, const RenderOptio
     sum.ssim += quality.ssim;
     return {};
   };
-  StillCloud still(from_origin);
+  ConstantCloud still(from_origin);
   Rasterizer rasterizer;
   ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.RenderEach(still, rays, RaysOf(pixel, options), add));
   if (sum.views > 0) {

@@ -51,7 +51,7 @@ double AngleBetween(const float* p, const float* q) {
     return out;
   };
   const std::array<double, 4> a = unit(p), b = unit(q);
-  // From the chord, not the cosine: the arc cosine loses half of the digits near 1.
+  // From the chord, as the arc cosine loses half of the digits near 1.
   double minus = 0, plus = 0;
   for (size_t k = 0; k < 4; ++k) {
     minus += (a[k] - b[k]) * (a[k] - b[k]);
@@ -60,7 +60,7 @@ double AngleBetween(const float* p, const float* q) {
   return 4 * std::asin(std::min(1.0, std::sqrt(std::min(minus, plus)) / 2));
 }
 
-// `apart`: the difference of their positions.
+// `apart`: difference of their positions.
 void CompareRow(const CloudView& a, int64_t i, const CloudView& b, int64_t j, const std::array<double, 3>& apart,
                 Sums& sums) {
   double distance = 0;
@@ -106,7 +106,7 @@ Result<AttributeError> CompareAttributes(const CloudView& a, const CloudView& b,
       for (size_t k = 0; k < 3; ++k) {
         const auto at_a = static_cast<size_t>(3 * i) + k, at_b = static_cast<size_t>(3 * j) + k;
         if (world_a.empty()) {
-          // From a's origin on, which is exact where both have the same.
+          // Relative to a's origin, which is exact if both have the same.
           const double from_origin =
               world_b.empty() ? (b.origin[k] - a.origin[k]) + double{b.means[at_b]} : world_b[at_b] - a.origin[k];
           difference[k] = double{a.means[at_a]} - from_origin;

@@ -15,7 +15,7 @@ namespace {
 constexpr std::string_view kPositive = "rdf";
 constexpr std::string_view kNegative = "lub";
 
-// Coordinates that each SH basis function is odd in: 1 = x, 2 = y, 4 = z.
+// Coordinates in which each SH basis function is odd: 1 = x, 2 = y, 4 = z.
 constexpr std::array<int, 16> kOddIn = {0, 2, 4, 1, 3, 6, 0, 5, 0, 2, 7, 2, 4, 1, 4, 1};
 
 AxisFlip FlipOf(const std::array<float, 3>& s) {
@@ -98,7 +98,7 @@ AxisTurn TurnBetween(const Axes& from, const Axes& to) {
   return turn;
 }
 
-AxisTurn Both(const AxisTurn& first, const AxisTurn& second) {
+AxisTurn Concatenate(const AxisTurn& first, const AxisTurn& second) {
   AxisTurn both;
   for (size_t k = 0; k < 3; ++k) {
     both.from[k] = first.from[second.from[k]];

@@ -50,8 +50,8 @@ TEST(Axes, DirectionsStayWhereTheyAre) {
   for (const std::string& a : AllNames()) {
     for (const char* b : {"RDF", "RFU", "DBL"}) {
       const Axes from = *AxesFromName(a), to = *AxesFromName(b);
-      EXPECT_TRUE(Both(TurnBetween(from, to), TurnBetween(to, from)).changes_nothing());
-      EXPECT_EQ(Both(TurnBetween(from, kRub), TurnBetween(kRub, to)), TurnBetween(from, to));
+      EXPECT_TRUE(Concatenate(TurnBetween(from, to), TurnBetween(to, from)).changes_nothing());
+      EXPECT_EQ(Concatenate(TurnBetween(from, kRub), TurnBetween(kRub, to)), TurnBetween(from, to));
     }
   }
 }

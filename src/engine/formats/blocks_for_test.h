@@ -18,8 +18,8 @@ namespace anchorsplat {
 using ReadFunction = Result<GaussianCloud> (*)(const InputFile&, const ReadLimits&);
 using BlocksFunction = Result<std::unique_ptr<CloudBlocks>> (*)(const InputFile&, const ReadLimits&);
 
-// How a file's blocks, looked at twice, differ from what reading it gave, or how the errors differ; empty where they do
-// not. Nothing to compare where there are none.
+// Compares a file's blocks, read twice, with `read`, the result of reading it whole: describes the first difference in
+// values or errors; empty if equal or if the file has no blocks.
 inline std::string DifferenceOfBlocks(BlocksFunction open, const InputFile& file, const ReadLimits& limits,
                                       const Result<GaussianCloud>& read) {
   const auto blocks = open(file, limits);

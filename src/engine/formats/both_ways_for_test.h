@@ -12,8 +12,8 @@
 
 namespace anchorsplat {
 
-// Reads a file whole and looks at it block by block, with all threads and with one: expects the same of both, warnings
-// included. For the tests of readers, which so are tests of blocks.
+// Reads a file whole and block by block, with all threads and with one, and expects equal results, including warnings.
+// Reader tests use it, so that they test blocks too.
 inline Result<GaussianCloud> ReadBothWays(ReadFunction read, BlocksFunction open, const InputFile& file,
                                           const ReadLimits& limits = {}) {
   std::vector<std::string> warnings, notes;
@@ -24,7 +24,7 @@ inline Result<GaussianCloud> ReadBothWays(ReadFunction read, BlocksFunction open
     notes = messages.notes();
     return result;
   }();
-  // A file that is only read whole says nothing before.
+  // A file that must be read whole reports nothing earlier.
   const bool has_blocks = [&] {
     const Messages unheard;
     const auto blocks = open(file, limits);

@@ -14,7 +14,7 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr const char* kInMemory = "bytes in memory";  // what messages call them
+constexpr const char* kInMemory = "bytes in memory";  // name in messages
 
 Result<const SplatFormat*> FormatCalled(std::string_view name) {
   if (const SplatFormat* format = FormatOfName(name)) return format;
@@ -36,7 +36,7 @@ Result<GaussianCloud> ReadCloudBytes(std::span<const std::byte> bytes, std::stri
 Result<std::vector<std::byte>> WriteCloudBytes(const CloudView& cloud, std::string_view format_name,
                                                const CloudWriteOptions& write) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SplatFormat* format, FormatCalled(format_name));
-  // Of the names that stand for one format of several files or one archive of them, the one that is an archive.
+  // Of a format's names for several files or one archive, use the archive.
   const std::filesystem::path path = Cat(kInMemory, format->extensions.front());
   if (format->several_files ||
       (format->written_beside != nullptr && !format->written_beside(path, kMaxShDegree).empty())) {

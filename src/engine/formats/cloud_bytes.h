@@ -12,13 +12,13 @@
 
 namespace anchorsplat {
 
-// Splat files that are bytes in memory.
+// Splat files in memory.
 
-// Reads one. `format` is its extension (".spz", "spz") or empty: found by the content. Nothing but the bytes is looked
-// at, so that what consists of several files is kBadFile. Other errors: kBadArgument: no such format; those of reading.
+// Reads a splat. `format`: its extension (".spz", "spz"), or empty to detect it by content. Formats of several files
+// are kBadFile. Other errors: kBadArgument: unknown format; those of reading.
 Result<GaussianCloud> ReadCloudBytes(std::span<const std::byte> bytes, std::string_view format);
 
-// The bytes of the file that WriteCloud would make. kBadArgument too: a format of several files.
+// Writes the file that WriteCloud would. Also kBadArgument: a format of several files.
 Result<std::vector<std::byte>> WriteCloudBytes(const CloudView& cloud, std::string_view format,
                                                const CloudWriteOptions& options = {});
 

@@ -10,11 +10,11 @@
 
 namespace anchorsplat {
 
-// What every writer asks first: arrays that agree and at least one Gaussian (kBadArgument otherwise).
+// First check of every writer: consistent arrays, at least one Gaussian (else kBadArgument).
 Status CheckWritable(const std::filesystem::path& path, const CloudView& cloud);
 
-// What every reader asks before it allocates: 1 … `limits.max_gaussians` (kBadFile otherwise). `where` begins the
-// message: "scene.spz: byte 8".
+// First check of every reader, before allocation: count in 1 … `limits.max_gaussians` (else kBadFile). `where` starts
+// the message: "scene.spz: byte 8".
 Status CheckCount(const std::string& where, uint64_t count, const ReadLimits& limits);
 
 }  // namespace anchorsplat

@@ -23,9 +23,9 @@ Status CheckCanWriteCloud(const fs::path& path, int sh_degree, const CloudWriteO
   return {};
 }
 
-Status WriteCloudOrKeep(const fs::path& path, const CloudView& cloud, const CloudWriteOptions& options,
-                        const ExtraProperties& extras) {
-  return WriteOrKeep(path, options.overwrite, [&](const fs::path& name, bool overwrite) {
+Status WriteCloudOrSaveBeside(const fs::path& path, const CloudView& cloud, const CloudWriteOptions& options,
+                              const ExtraProperties& extras) {
+  return WriteOrSaveBeside(path, options.overwrite, [&](const fs::path& name, bool overwrite) {
     CloudWriteOptions write = options;
     write.overwrite = overwrite;
     return WriteCloud(name, cloud, write, extras);

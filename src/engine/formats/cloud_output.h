@@ -10,17 +10,17 @@
 
 namespace anchorsplat {
 
-// Writing a splat that took long to make.
+// Writing a splat after long work.
 
-// All files that WriteCloud makes, the one that is named first.
+// All files that WriteCloud creates, `path` first.
 std::vector<std::filesystem::path> FilesOfCloud(const std::filesystem::path& path, int sh_degree);
 
-// The errors that WriteCloud would have with these files, before the work.
+// Checks for WriteCloud's file errors before the work.
 Status CheckCanWriteCloud(const std::filesystem::path& path, int sh_degree, const CloudWriteOptions& options = {});
 
-// WriteCloud after the work. Where the name cannot be had any more, because a file of that name came into being
-// meanwhile, the result goes to the next free name beside it, "scan-2.ply", and the error says so.
-Status WriteCloudOrKeep(const std::filesystem::path& path, const CloudView& cloud,
-                        const CloudWriteOptions& options = {}, const ExtraProperties& extras = {});
+// WriteCloud after the work. If a file of that name has appeared meanwhile, writes to the next free name beside it,
+// "scan-2.ply", and returns an error that says so.
+Status WriteCloudOrSaveBeside(const std::filesystem::path& path, const CloudView& cloud,
+                              const CloudWriteOptions& options = {}, const ExtraProperties& extras = {});
 
 }  // namespace anchorsplat

@@ -36,7 +36,7 @@ namespace fs = std::filesystem;
 
 double Now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
-// Every array of the cloud with the width of its rows.
+// All arrays of the cloud with their row widths.
 template <typename Visit>
 void ForEachArray(GaussianCloud& cloud, Visit&& visit) {
   visit(cloud.means, 3);
@@ -128,7 +128,7 @@ Result<GaussianCloud> ReadBack(const fs::path& output, const CloudWriteOptions& 
                                ExtraProperties* extras) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSplat file, OpenWritten(output, write));
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud back, file.Read({}, extras));
-  if (!file.format()->keeps_origin) back.origin = written.origin;  // a warning has said where it is
+  if (!file.format()->keeps_origin) back.origin = written.origin;  // a warning gave the origin
   return back;
 }
 
@@ -154,23 +154,23 @@ Result<ConvertedSplat> ReadToConvert(const OpenedSplat& file, const std::string&
   report.sh_degree_read = splat.cloud.sh_degree;
   report.input_bytes = file.bytes();
   WarnOfStored(name, splat.cloud, options.stored);
-  MakeStored(splat.cloud, options.stored, splat.extras.full_color);
+  ConvertToStored(splat.cloud, options.stored, splat.extras.full_color);
   splat.cloud.double_means |= options.double_means;
-  // Readers and writers follow their formats and what a file declares; what it really is comes on top.
-  if (options.input_axes || options.output_axes) DropSpzPlaces(name, splat.cloud.comments);
+  // Readers and writers follow their formats and the file's declaration; the options' axes come on top.
+  if (options.input_axes || options.output_axes) DropSpzGeoreference(name, splat.cloud.comments);
   if (options.input_axes) {
     Axes taken = from != nullptr ? from->axes : kRdf;
     if (from != nullptr && from->declared_axes != nullptr) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(taken, from->declared_axes(file.input()));
     }
-    TurnBoth(Both(TurnBetween(kRdf, taken), TurnBetween(*options.input_axes, kRdf)), splat.cloud, splat.extras);
+    TurnBoth(Concatenate(TurnBetween(kRdf, taken), TurnBetween(*options.input_axes, kRdf)), splat.cloud, splat.extras);
   }
   return splat;
 }
 
 void WarnOfUnusable(const SplatFormat& to, const std::string& name, const GaussianCloud& cloud) {
-  // Without harmonics: looking through them would take longer than all else here. Other formats say what becomes of
-  // such Gaussians when they are written.
+  // Without SH, which would take longer than everything else here. Other formats report unusable Gaussians when
+  // written.
   if (const int64_t bad = to.keeps_all_values ? CountUnusable(cloud, false) : 0; bad > 0) {
     LogWarning(Cat(name, ": ", WithThousands(bad), " of ", WithThousands(cloud.size()),
                    " Gaussians have a position, scale, rotation or opacity that no verb draws: ", kWhyUnusable));
@@ -193,10 +193,10 @@ Result<ConvertReport> WriteConverted(ConvertedSplat splat, const fs::path& outpu
   ExtraProperties& extras = splat.extras;
   report.output_format = to->name;
   if (options.output_axes) {
-    const AxisTurn written = Both(TurnBetween(kRdf, *options.output_axes), TurnBetween(to->axes, kRdf));
+    const AxisTurn written = Concatenate(TurnBetween(kRdf, *options.output_axes), TurnBetween(to->axes, kRdf));
     const bool said = UpOf(cloud.comments).has_value();
     TurnBoth(written, cloud, extras);
-    // What a reader takes for granted does not hold any more.
+    // The reader's assumption no longer holds.
     if (!said && written.matrix()[4] != 1 && to->comments != CommentPlace::kNone) {
       cloud.comments.push_back(UpComment(kUsualUp));
       TurnUpComments(written.matrix(), cloud.comments);
@@ -236,7 +236,7 @@ Result<ConvertReport> WriteConverted(ConvertedSplat splat, const fs::path& outpu
       HiddenRows hidden = HideRows(*to, cloud);
       const CloudView expected = hidden.any() ? CloudView(hidden.written) : CloudView(cloud);
       const Buffer<uint32_t> order = WriteOrder(expected, write.order, to->order);
-      for (const Buffer<int64_t>* rows : {&hidden.unusable, &hidden.strays.rows}) {  // have nothing to be compared
+      for (const Buffer<int64_t>* rows : {&hidden.unusable, &hidden.strays.rows}) {  // nothing to compare
         for (const int64_t row : *rows) hidden.written.opacity_logits[static_cast<size_t>(row)] = std::nanf("");
       }
       ANCHORSPLAT_ASSIGN_OR_RETURN(report.error,
@@ -252,7 +252,7 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SplatFormat* const to, WrittenFormat(output, options));
   const InputRecord record;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSplat file, OpenedSplat::Open(input, options.input_format));
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(output));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckNotInput(output));
   ANCHORSPLAT_ASSIGN_OR_RETURN(ConvertedSplat splat, ReadToConvert(file, input.string(), options));
   GaussianCloud& cloud = splat.cloud;
   WarnOfUnusable(*to, input.string(), cloud);
@@ -265,7 +265,7 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
                                               " or more: nothing to write")};
   }
   return WriteConverted(std::move(splat), output, options, kept);
-} catch (const NoDiskRoom& none) {
+} catch (const DiskFull& none) {
   return Error{ErrorCode::kIo, Cat(input.string(), ": ", none.what())};
 } catch (const std::bad_alloc&) {
   return Error{ErrorCode::kIo, Cat(input.string(), ": there is not enough memory for its Gaussians")};

@@ -191,7 +191,7 @@ TEST(Convert, SaidAxesInsteadOfDeclaredOnes) {
   const TestFolder folder;
   const GaussianCloud cloud = RandomCloud(50, 0, 3);
   GaussianCloud turned = cloud;
-  TurnAxes(turned, Both(TurnBetween(kRdf, *AxesFromName("RFU")), TurnBetween(kRub, kRdf)));
+  TurnAxes(turned, Concatenate(TurnBetween(kRdf, *AxesFromName("RFU")), TurnBetween(kRub, kRdf)));
   ASSERT_TRUE(WriteCloud(folder / "a.spz", turned).ok());
   std::string bytes = FileBytes(folder / "a.spz");
   const uint32_t record[3] = {0xADBE0003, 4, 6};  // RDF, which it is not
@@ -235,7 +235,7 @@ TEST(Convert, NumbersThatMeanSomethingElse) {
     EXPECT_THAT(messages.TakeWarnings(),
                 testing::ElementsAre(testing::HasSubstr("--scales lengths"), testing::HasSubstr("--opacities 0-1"),
                                      testing::HasSubstr(one == 1 ? "--colors 0-1" : "--colors 0-255")));
-    options.stored = {.lengths = true, .opacities = true, .color_of_one = one};
+    options.stored = {.lengths = true, .opacities = true, .max_color = one};
     ASSERT_TRUE(ConvertFile(input, folder / "out.ply", options).ok());
     EXPECT_THAT(messages.TakeWarnings(), testing::IsEmpty());
     const auto error = CompareAttributes(*ReadCloud(folder / "out.ply"), cloud);
@@ -356,8 +356,8 @@ TEST(Convert, TheInputStaysWhatItIs) {
   const InputRecord record;
   RecordSplat(folder / "gone.ply");
   RecordSplat(folder / "hard.ply");
-  EXPECT_TRUE(CheckIsNoInput(folder / "a.ply").ok());
-  EXPECT_FALSE(CheckIsNoInput(input).ok());
+  EXPECT_TRUE(CheckNotInput(folder / "a.ply").ok());
+  EXPECT_FALSE(CheckNotInput(input).ok());
 }
 
 TEST(Convert, AFolderOfPicturesIsASplat) {

@@ -15,40 +15,39 @@
 
 namespace anchorsplat {
 
-// What a PLY says of each Gaussian beside what a Gaussian is: labels, confidences, normals. Nobody here looks at these
-// values; they are read, follow their Gaussians through selection and sorting, and are written again.
+// Per-Gaussian PLY properties that are not part of a Gaussian: labels, confidences, normals. Their values are not
+// interpreted; they follow their Gaussians through selection and sorting and are written again.
 struct ExtraProperties {
   struct Property {
     std::string name;
     PlyType type = PlyType::kFloat;
   };
-  std::vector<Property> properties;  // scalars in the order of the file, without normals
-  Buffer<std::byte> rows;            // [N, row_size()] the values one after the other, little-endian
-  Buffer<float> normals;             // [N,3]; empty where there are none, or where all are zero
-  // [N,3] world positions as the file has them, of which the means are rounded differences to the cloud's origin; empty
-  // where means are all there is to know.
+  std::vector<Property> properties;  // scalars in file order, without normals
+  Buffer<std::byte> rows;            // [N, row_size()] packed values, little-endian
+  Buffer<float> normals;             // [N,3]; empty if absent or all zero
+  // [N,3] exact world positions, if means are rounded differences to the cloud's origin; else empty.
   Buffer<double> world;
-  float full_color = 0;  // what red green blue in the place of f_dc_* were taken to have at most; 0: there is f_dc
-  std::vector<std::string> not_kept;  // what no writer has a place for, for messages: `list "neighbours"`
+  float full_color = 0;  // full intensity assumed for red green blue in place of f_dc_*; 0: the file has f_dc
+  std::vector<std::string> not_kept;  // what no writer can store, for messages: `list "neighbours"`
 
   size_t row_size() const;  // bytes
   bool empty() const { return properties.empty() && normals.empty() && world.empty(); }
-  bool fits(int64_t gaussians) const;  // has a row for each of them
+  bool fits(int64_t gaussians) const;  // one row per Gaussian
   // For messages: "label, confidence, normals".
   std::string names() const;
-  // What is not written, for messages: `not_kept`, and all the rest where the writer keeps no extras.
+  // What is not written, for messages: `not_kept`, and everything if the writer stores no extras.
   std::string lost(bool writer_keeps) const;
 };
 
-// The rows for which keep[i] is set; their order stays.
+// Keeps rows with keep[i] set, in order.
 void KeepRows(ExtraProperties& extras, const std::vector<char>& keep);
-// Row i becomes the old row rows[i]; a permutation.
+// Moves old row rows[i] to row i; `rows` is a permutation.
 void ReorderRows(ExtraProperties& extras, const Buffer<uint32_t>& rows);
-// Normals along other axes. What else may have a direction is not known.
+// Converts normals to other axes; other properties with a direction are unknown.
 void TurnAxes(ExtraProperties& extras, const AxisTurn& turn);
 
-// WriteCloud (cloud_io.h) with what the input says of the same Gaussians beside them, in the order of the cloud.
-// Formats without a place for it leave it out, and a warning names it.
+// WriteCloud (cloud_io.h) with extra properties in the order of the cloud. Formats that cannot store them drop them
+// with a warning.
 Status WriteCloud(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options,
                   const ExtraProperties& extras);
 

@@ -14,39 +14,39 @@
 
 namespace anchorsplat {
 
-// Blocks of a file that is read anew each time. A format says how some neighbouring rows are had.
+// Blocks that are read from the file in every pass. Formats implement Fill.
 class FileBlocks : public CloudBlocks {
  public:
-  // Errors: the one of the lowest row that has any.
-  Status ForEach(const Look& look) override;
+  // Errors: that of the lowest failing row.
+  Status ForEach(const Visitor& visit) override;
 
  protected:
-  // What a thread keeps from block to block.
-  struct Room {
+  // A thread's buffers, reused between blocks.
+  struct Scratch {
     GaussianCloud rows;  // SH degree 0
     Buffer<uint8_t> bytes;
   };
 
-  // Rows [first, last) of the splat, at most kCloudBlockRows, as reading gives them: to rows 0 and on of `room.rows`,
-  // which has as many. finite[i] is 1 and to become 0 where a harmonic that depends on the direction is infinite or
-  // NaN; empty after the first time. Called from several threads.
-  virtual Status Fill(int64_t first, int64_t last, Room& room, std::span<uint8_t> finite) = 0;
-  // All rows have been seen for the first time, and no error: what reading says at its end.
-  virtual Status EndFirst() { return {}; }
+  // Reads rows [first, last), at most kCloudBlockRows, into scratch.rows from row 0 on, which has room for them. In
+  // the first pass sets finite[i], initially 1, to 0 if an SH coefficient of degree ≥ 1 is not finite; `finite` is
+  // empty in later passes. Thread-safe.
+  virtual Status Fill(int64_t first, int64_t last, Scratch& scratch, std::span<uint8_t> finite) = 0;
+  // Called after the first pass without errors; reports what the reader reports at its end.
+  virtual Status EndFirstPass() { return {}; }
 
   bool first_time() const { return !usable_known_; }
   void BeginPass();
-  // Calls `look` with the blocks of rows [first, last); `first` is a multiple of kCloudBlockRows.
-  Status Show(int64_t first, int64_t last, Room& room, const Look& look);
+  // Visits the blocks of rows [first, last); `first` is a multiple of kCloudBlockRows.
+  Status VisitRows(int64_t first, int64_t last, Scratch& scratch, const Visitor& visit);
   Status EndPass();
 };
 
-// Rows that share a Room: work for a thread.
-inline constexpr int64_t kRowsPerRoom = 4 * kCloudBlockRows;
+// Rows per task, which share a Scratch.
+inline constexpr int64_t kRowsPerScratch = 4 * kCloudBlockRows;
 
-// Whether one of `count` floats is infinite or NaN: its exponent is all ones, to which one more is added here so that
-// the sign bit tells. `from` has any alignment.
-inline bool HasNotFinite(const uint8_t* from, size_t count) {
+// Whether any of `count` floats at `from` (any alignment) is infinite or NaN: an exponent of all ones overflows into
+// the sign bit when one is added.
+inline bool HasNonFinite(const uint8_t* from, size_t count) {
   uint32_t carry = 0;
   for (size_t k = 0; k < count; ++k) {
     uint32_t bits;
@@ -56,9 +56,9 @@ inline bool HasNotFinite(const uint8_t* from, size_t count) {
   return (carry >> 31) != 0;
 }
 
-// Calls unpack(bytes, count, to) for records [first, last) of a file, which begin at byte `begin`: `count` records are
-// rows `to` of the block and on. They stay in the L2 cache with what becomes of them; large records take no more memory
-// than small ones.
+// Reads records [first, last), which start at byte `begin` of the file, and calls unpack(bytes, count, to) for pieces:
+// `count` records for rows of the block from `to` on. Pieces fit in the L2 cache with their results, and memory does
+// not grow with the record size.
 template <typename Unpack>
 Status ReadRows(const InputFile& file, uint64_t begin, size_t record, int64_t first, int64_t last,
                 Buffer<uint8_t>& bytes, Unpack&& unpack) {

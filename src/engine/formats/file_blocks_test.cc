@@ -26,7 +26,7 @@ TEST(FileBlocks, ShowWhatReadingGives) {
     const std::filesystem::path path = folder / ("a" + std::string(format.extensions.front()));
     for (int degree = 0; degree <= kMaxShDegree; ++degree) {
       for (const int64_t n : {int64_t{2}, int64_t{700}, 5 * kCloudBlockRows + 3}) {
-        GaussianCloud cloud = TroubledCloud(n, degree);
+        GaussianCloud cloud = CloudWithNonFinite(n, degree);
         cloud.comments = {"a comment", "credit: Mug by Ann, CC BY 4.0"};
         if (degree == 1) cloud.render_mode = RenderMode::kAntialiased;
         SCOPED_TRACE(testing::Message() << format.name << ", " << n << " Gaussians of degree " << degree);
@@ -48,11 +48,11 @@ TEST(FileBlocks, FindWhatIsNotFiniteWhereverItLies) {
   for (size_t count = 0; count < 50; ++count) {
     std::vector<float> values(count + 1, std::numeric_limits<float>::max());
     const auto bytes = [&] { return reinterpret_cast<const uint8_t*>(values.data()); };
-    EXPECT_FALSE(HasNotFinite(bytes(), count));
+    EXPECT_FALSE(HasNonFinite(bytes(), count));
     for (const float bad : {inf, -inf, std::nanf("")}) {
       values[count] = bad;
-      EXPECT_FALSE(HasNotFinite(bytes(), count)) << "it lies behind them";
-      EXPECT_TRUE(HasNotFinite(bytes(), count + 1));
+      EXPECT_FALSE(HasNonFinite(bytes(), count)) << "it lies behind them";
+      EXPECT_TRUE(HasNonFinite(bytes(), count + 1));
     }
   }
 }

@@ -7,7 +7,7 @@
 
 namespace anchorsplat {
 
-// Keeps the failure of the lowest row, so that the message does not depend on which thread was first.
+// Keeps the failure of the lowest row, so that errors do not depend on thread timing.
 class FirstFailure {
  public:
   void Report(int64_t row, const Status& status) {

@@ -9,14 +9,14 @@
 
 namespace anchorsplat {
 
-// How much a file holds, as its header says: known before anything else of it is read, and not checked yet.
+// Size of a splat as its header states, unchecked; known before the rest is read.
 struct CloudExtent {
   int64_t gaussians = 0;
   int sh_degree = 0;
 };
 
-// What a file says about itself beside its Gaussians, for `info`: version, bits, flags. Name and value, in an order for
-// people; text from the file is escaped.
+// Properties of a file besides its Gaussians, for `info`: version, bits, flags. Names and values in display order; text
+// from the file is escaped.
 class FormatFacts {
  public:
   template <typename... Parts>

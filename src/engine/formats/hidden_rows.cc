@@ -32,7 +32,7 @@ Buffer<int64_t> UnusableRows(const CloudView& cloud) {
 
 // `rows` are ascending.
 void Hide(std::span<const int64_t> rows, GaussianCloud& cloud) {
-  int64_t like = 0;  // the first row that is not hidden; none where all are
+  int64_t like = 0;  // first row not hidden; none if all are
   for (size_t k = 0; k < rows.size() && rows[k] == like; ++k) ++like;
   const auto put = [&](Buffer<float>& array, int64_t width, int64_t row, float otherwise) {
     float* const to = array.data() + row * width;
@@ -43,7 +43,7 @@ void Hide(std::span<const int64_t> rows, GaussianCloud& cloud) {
     }
   };
   for (const int64_t row : rows) {
-    if (row > like) like = row - 1;  // hidden before, if it was: a copy of one that is not
+    if (row > like) like = row - 1;  // the previous row, already replaced if it was hidden
     put(cloud.means, 3, row, 0);
     put(cloud.log_scales, 3, row, 0);
     put(cloud.quats, 4, row, 1);
@@ -56,7 +56,7 @@ void Hide(std::span<const int64_t> rows, GaussianCloud& cloud) {
 
 HiddenRows HideRows(const SplatFormat& format, const CloudView& cloud) {
   HiddenRows hidden;
-  // Those that leave rows out leave these out, and say so themselves.
+  // Formats that drop rows drop these too, and report them.
   if (format.keeps_all_values || format.written_rows != nullptr) return hidden;
   hidden.unusable = UnusableRows(cloud);
   if (format.strays != nullptr) hidden.strays = format.strays(cloud);

@@ -11,21 +11,20 @@
 
 namespace anchorsplat {
 
-// Gaussians that a format must not show: those that nobody draws whatever their opacity (not IsUsable), where it cannot
-// say all their values, and strays. Writing them without opacity is decided here for all formats, so that no writer
-// meets any.
+// Gaussians that must not be visible in a format: unusable rows, if it cannot store all their values, and strays
+// (strays.h). They are replaced here for all formats, so that writers never see them.
 struct HiddenRows {
   Buffer<int64_t> unusable;  // ascending
   Strays strays;
-  // The cloud with copies, without opacity, of the row before in their places, so that they neither show nor widen any
-  // range. Nothing where none is hidden: then it is written as it is.
+  // The cloud with each hidden row replaced by a zero-opacity copy of the previous row, which neither shows nor widens
+  // a range. Empty if nothing is hidden: write the cloud as it is.
   GaussianCloud written;
 
   bool any() const { return !written.empty(); }
 };
 HiddenRows HideRows(const SplatFormat& format, const CloudView& cloud);
 
-// Says how many are hidden, and why.
+// Warns how many are hidden, and why.
 void WarnOfHiddenRows(const std::filesystem::path& path, const SplatFormat& format, const HiddenRows& hidden);
 
 }  // namespace anchorsplat

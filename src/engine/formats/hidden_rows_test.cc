@@ -52,7 +52,7 @@ std::vector<float> Picture(const GaussianCloud& cloud) {
   Camera camera;
   camera.intrinsics = PinholeFromFov(96, 96, 0.8);
   camera.world_to_camera.translation = {0.1, -0.2, 4};
-  RenderOptions options = OptionsFor(cloud);
+  RenderOptions options = DisplayOptions(cloud);
   options.subject.reset();
   options.sh_degree = 0;  // .splat has no more
   Rasterizer rasterizer;

@@ -15,7 +15,7 @@ namespace anchorsplat {
 
 namespace {
 
-// What else is in there is another program's.
+// Other contents belong to other programs.
 void AddMarks(const JsonValue& asset, std::vector<std::string>& comments) {
   constexpr size_t kMost = 16, kMostBytes = 1000;
   const std::optional<JsonValue> extras = asset.Find("extras");
@@ -49,7 +49,7 @@ nlohmann::json AssetOf(std::span<const std::string> comments, const WorldOrigin&
 }
 
 Result<std::vector<std::string>> CommentsOfAsset(const JsonValue& root) {
-  constexpr size_t kMostBytes = size_t{1} << 20;  // as much as the header of a PLY may have
+  constexpr size_t kMostBytes = size_t{1} << 20;  // the same limit as for a PLY header
   const std::optional<JsonValue> asset = root.Find("asset");
   std::vector<std::string> comments;
   if (!asset) return comments;

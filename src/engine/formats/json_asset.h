@@ -12,18 +12,16 @@
 
 namespace anchorsplat {
 
-// The member "asset" of a file that is JSON, as glTF defines it and SOG took it over: what made the file, and whose it
-// is. `generator` is ours; `copyright` are the credits, a line each, and `extras.comments` the marks, where up is
-// (core/splat_comments.h) and, where it is not zero, the origin of the means (core/world_origin.h); neither is there
-// where there are none.
+// The member "asset" of a JSON file, as defined by glTF and adopted by SOG. `generator` is ours; `copyright` has the
+// credits, one per line; `extras.comments` has the marks and up direction (core/splat_comments.h) and, if not zero, the
+// origin of the means (core/world_origin.h). Empty members are omitted.
 nlohmann::json AssetOf(std::span<const std::string> comments, const WorldOrigin& origin);
 
-// The credits, marks, ups and origin that such a file says, as comments; none where it says nothing, or no text.
-// kBadFile: a mebibyte of credits.
+// Credits, marks, up directions and origin of such a file, as comments; none if absent or not text. kBadFile: over a
+// mebibyte of credits.
 Result<std::vector<std::string>> CommentsOfAsset(const JsonValue& root);
 
-// Names of members that a format does not have, and a warning for those that may speak of axes: nobody knows what they
-// would mean.
+// Names of unknown members; and a warning for those that may concern axes, whose meaning is unknown.
 std::vector<std::string> OtherEntries(const JsonValue& root, std::span<const std::string_view> known);
 void WarnOfAxisEntries(const std::string& file, std::span<const std::string> others);
 

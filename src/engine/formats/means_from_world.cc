@@ -16,7 +16,7 @@ namespace anchorsplat {
 
 namespace {
 
-// Half of the Gaussians are longer; of very many, of every so many. `sample` gets where these are.
+// Median length of Gaussians; very large clouds are subsampled. `sample` receives their positions.
 double TypicalLength(const GaussianCloud& cloud, const Buffer<double>& world, std::vector<double>& sample) {
   constexpr int64_t kSamples = 1 << 16;
   const int64_t step = (cloud.size() + kSamples - 1) / kSamples;
@@ -30,10 +30,10 @@ double TypicalLength(const GaussianCloud& cloud, const Buffer<double>& world, st
   return lengths.empty() ? 0 : std::exp(double{Quantile(lengths, 0.5)});
 }
 
-// Where Gaussians lie so far from each other that no origin makes floats fine enough for all. `said`: the file's own.
+// Warns if Gaussians are so far apart that no origin makes floats fine enough for all. `said`: the file's own origin.
 void WarnOfRounding(const std::string& file, const Buffer<double>& world, const WorldOrigin& said,
                     const GaussianCloud& cloud) {
-  constexpr double kSeen = 1.0 / 16;  // of a Gaussian's length
+  constexpr double kSeen = 1.0 / 16;  // relative to a Gaussian's length
   int64_t count = 0;
   double most = 0;
   for (int64_t i = 0; i < cloud.size(); ++i) {

@@ -7,9 +7,9 @@
 
 namespace anchorsplat {
 
-// Makes the means of a cloud whose other rows are read from `world`, [N,3], as the file has them in double: floats from
-// an origin on, where floats need one (core/world_origin.h), which is added to the cloud's. Warns, with the name of the
-// file, where Gaussians lie so far from each other that positions are rounded all the same.
+// Sets the means of a cloud from `world` [N,3], double-precision positions in the file, relative to a chosen origin
+// where floats need one (core/world_origin.h), which is added to the cloud's. Other columns must be set. Warns, with
+// the file name, if Gaussians are so far apart that positions are rounded anyway.
 void MeansFromWorld(const std::string& file, const Buffer<double>& world, GaussianCloud& cloud);
 
 }  // namespace anchorsplat

@@ -6,7 +6,8 @@
 
 namespace anchorsplat {
 
-// Of lengths and opacities as files have them. NaN stays what it is, which nobody draws: it is neither flat nor faint.
+// Conversions of stored lengths and opacities that keep NaN: such Gaussians are not drawn, while other conversions
+// would make them flat or faint.
 inline float LogFromStoredScale(float scale) { return std::isnan(scale) ? scale : LogFromScale(scale); }
 inline float LogitFromStoredOpacity(float opacity) { return std::isnan(opacity) ? opacity : LogitFromOpacity(opacity); }
 

@@ -31,7 +31,7 @@ std::string ReadFormats() {
   return list;
 }
 
-// Whether it must be unpacked, or read as a whole, before anything is known of it.
+// Whether it must be decompressed or read whole to learn anything about it.
 bool IsWrapped(const fs::path& path) {
   const Result<InputFile> file = InputFile::Open(path);
   return file.ok() && IsWrapped(*file);
@@ -66,7 +66,7 @@ Result<OpenedSplat> OpenedSplat::Of(InputFile input, const SplatFormat* format) 
     InputFile& file = found.file;
     if (file.size() == 0) return Error{ErrorCode::kBadFile, Cat(file.name(), ": is empty, expected a splat file")};
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(kSniffBytes));
-    if (const std::string what = WhatElse(head); !what.empty()) {
+    if (const std::string what = DescribeNonSplat(head); !what.empty()) {
       return Error{ErrorCode::kBadFile, Cat(file.name(), ": ", what, "; expected ", ReadFormats())};
     }
     if (format == nullptr) {
@@ -80,7 +80,7 @@ Result<OpenedSplat> OpenedSplat::Of(InputFile input, const SplatFormat* format) 
     opened.packed_ = std::move(found.packed);
     if (!opened.packed_.empty()) opened.packed_bytes_ = size;
     return opened;
-  } catch (const NoDiskRoom& none) {
+  } catch (const DiskFull& none) {
     return Error{ErrorCode::kIo, Cat(name, ": ", none.what())};
   } catch (const std::bad_alloc&) {
     return Error{ErrorCode::kIo, Cat(name, ": there is not enough memory for what is packed in it")};
@@ -118,7 +118,7 @@ Result<GaussianCloud> OpenedSplat::Read(const ReadLimits& limits, ExtraPropertie
     return format_->read_with_extras(input_, limits, *extras);
   }
   return format_->read(input_, limits);
-} catch (const NoDiskRoom& none) {
+} catch (const DiskFull& none) {
   return Error{ErrorCode::kIo, Cat(input_.name(), ": ", none.what())};
 } catch (const std::bad_alloc&) {
   return Error{ErrorCode::kIo, Cat(input_.name(), ": there is not enough memory for its Gaussians")};
@@ -143,10 +143,10 @@ void RecordSplat(const fs::path& path) {
   if (path == "-") return RecordInput(path);
   const fs::path found = SplatPath(path);
   RecordInput(found);
-  // A pipe can be read only once. What is packed would be unpacked, and has nothing beside it as a rule.
+  // Pipes can be read only once. Compressed files would be decompressed, and rarely have files beside them.
   if (!IsFile(found) || IsWrapped(found)) return;
   const Result<OpenedSplat> file = OpenedSplat::Open(found);
-  if (file.ok()) (void)file->bytes();  // looks at all of them
+  if (file.ok()) (void)file->bytes();  // records all of them
 }
 
 }  // namespace anchorsplat

@@ -10,32 +10,32 @@
 
 namespace anchorsplat {
 
-// Rounding to the few bits that splat formats keep. NaN becomes 0 and values beyond the range its ends, so that no
-// cloud can make a conversion to an integer undefined.
+// Quantization to the few bits of splat formats. NaN becomes 0 and values are clamped, so that integer conversion is
+// never undefined.
 
-// `unit` in 0–1 to 0 … max (≤ 2²⁴), nearest.
+// `unit` in 0–1 to the nearest of 0 … max (≤ 2²⁴).
 inline uint32_t QuantizeUnit(float unit, uint32_t max) {
   const float scaled = unit * static_cast<float>(max) + 0.5f;
   if (!(scaled > 0)) return 0;
   return scaled >= static_cast<float>(max) ? max : static_cast<uint32_t>(scaled);
 }
 
-// To a byte, nearest.
+// To the nearest byte.
 inline uint8_t QuantizeByte(float value) {
   const float shifted = value + 0.5f;
   const float bounded = shifted > 0 ? (shifted < 255.5f ? shifted : 255.5f) : 0.0f;
   return static_cast<uint8_t>(static_cast<int32_t>(bounded));
 }
 
-// The opacity of a stored logit as a byte. What is too faint to be drawn stays so: rounded up to 1/255, a large one
-// would lie over everything.
+// Opacity byte of a stored logit. Opacities too faint to be drawn become 0: rounded up to 1/255, a large Gaussian would
+// cover everything.
 inline uint8_t OpacityByte(float logit) {
   const float opacity = Sigmoid(logit);
-  return opacity >= kLeastOpacity ? QuantizeByte(255 * opacity) : 0;
+  return opacity >= kMinOpacity ? QuantizeByte(255 * opacity) : 0;
 }
 
-// A quaternion of the same direction whose square is a float; zero where it has none (zero, NaN).
-inline std::array<float, 4> WithinFloats(const float quat[4]) {
+// Rescales a quaternion so that its squared norm fits a float; zero if it has no direction (zero, NaN).
+inline std::array<float, 4> RescaledToFloat(const float quat[4]) {
   std::array<float, 4> out = {quat[0], quat[1], quat[2], quat[3]};
   const float square = out[0] * out[0] + out[1] * out[1] + out[2] * out[2] + out[3] * out[3];
   if (square > 1e-30f && square < 1e30f) return out;
@@ -46,9 +46,9 @@ inline std::array<float, 4> WithinFloats(const float quat[4]) {
   return has_direction ? out : std::array<float, 4>{};
 }
 
-// A unit quaternion without its largest component, which follows from the others: the sign is chosen so that it is
-// positive. `rest` keeps the order of the components that are left; each lies in ±√½. A quaternion without direction
-// (zero, NaN) counts as (1, 0, 0, 0) of `quat`'s own order, given by `identity`.
+// A unit quaternion without its largest component, which is implied: the sign is chosen so that it is positive. `rest`
+// has the other components in order, each within ±√½. A quaternion without direction (zero, NaN) becomes the identity,
+// with `identity` the index of w.
 struct SmallestThree {
   uint32_t largest = 0;
   float rest[3] = {0, 0, 0};
@@ -57,7 +57,7 @@ inline constexpr float kSqrtHalf = 0.70710678118654752f;
 
 inline SmallestThree DropLargest(const float stored[4], uint32_t identity) {
   SmallestThree out;
-  const std::array<float, 4> quat = WithinFloats(stored);
+  const std::array<float, 4> quat = RescaledToFloat(stored);
   const float norm = std::sqrt(quat[0] * quat[0] + quat[1] * quat[1] + quat[2] * quat[2] + quat[3] * quat[3]);
   if (!(norm > 0)) {
     out.largest = identity;

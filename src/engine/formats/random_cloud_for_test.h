@@ -11,7 +11,7 @@
 
 namespace anchorsplat {
 
-// For tests: a cloud of normally distributed values.
+// For tests: a cloud with normally distributed values.
 inline GaussianCloud RandomCloud(int64_t n, int degree, uint64_t seed) {
   GaussianCloud cloud;
   cloud.Resize(n, degree);
@@ -22,8 +22,8 @@ inline GaussianCloud RandomCloud(int64_t n, int degree, uint64_t seed) {
   return cloud;
 }
 
-// The same with harmonics and other values that are not finite here and there.
-inline GaussianCloud TroubledCloud(int64_t n, int degree) {
+// The same with some non-finite values in every array.
+inline GaussianCloud CloudWithNonFinite(int64_t n, int degree) {
   GaussianCloud cloud = RandomCloud(n, degree, static_cast<uint64_t>(degree + 1));
   const float bad[] = {std::nanf(""), std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()};
   for (int64_t i = 0; i < n; i += 7) {
@@ -33,7 +33,7 @@ inline GaussianCloud TroubledCloud(int64_t n, int degree) {
     const size_t width = array.size() / static_cast<size_t>(n);
     array[k * width + (k / 5) % width] = bad[k % 3];
   }
-  // The largest finite numbers are none of them.
+  // The largest finite number is not one of them.
   cloud.sh[0] = std::numeric_limits<float>::max();
   cloud.sh[1] = std::numeric_limits<float>::denorm_min();
   return cloud;
@@ -43,7 +43,7 @@ inline bool SameBits(const Buffer<float>& a, const Buffer<float>& b) {
   return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0);
 }
 
-// Every stored value, NaNs and zeros included, and the metadata.
+// Compares all stored values bitwise, and the metadata.
 inline void ExpectSameCloud(const GaussianCloud& a, const GaussianCloud& b) {
   EXPECT_EQ(a.sh_degree, b.sh_degree);
   EXPECT_TRUE(SameBits(a.means, b.means));

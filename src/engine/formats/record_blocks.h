@@ -12,14 +12,14 @@
 
 namespace anchorsplat {
 
-// Records of one size that lie one after the other in a file, in parallel, block by block: a block stays in the L2
-// cache between the system call and the code that (un)packs it.
+// Parallel access to consecutive fixed-size records of a file in blocks that stay in the L2 cache between the system
+// call and (un)packing.
 
 namespace internal {
 inline constexpr size_t kRecordBlock = size_t{256} << 10;  // bytes
-inline constexpr int64_t kBlocksPerTask = 8;               // that share one buffer
+inline constexpr int64_t kBlocksPerTask = 8;               // sharing one buffer
 
-// Calls block(first, last, buffer) until it fails; the first failure in time is returned.
+// Calls block(first, last, buffer) until one fails; returns the failure that occurred first.
 template <typename Block>
 Status ForRecordBlocks(int64_t count, size_t record_size, Block&& block) {
   const auto records = static_cast<int64_t>(std::max<size_t>(1, kRecordBlock / record_size));
@@ -39,7 +39,7 @@ Status ForRecordBlocks(int64_t count, size_t record_size, Block&& block) {
 }
 }  // namespace internal
 
-// Calls unpack(first, last, bytes) for ranges that cover records [0, count), which begin at byte `begin`.
+// Calls unpack(first, last, bytes) for ranges that cover records [0, count), which start at byte `begin`.
 template <typename Unpack>
 Status ReadRecords(const InputFile& file, uint64_t begin, int64_t count, size_t record_size, Unpack&& unpack) {
   return internal::ForRecordBlocks(count, record_size, [&](int64_t first, int64_t last, uint8_t* bytes) -> Status {
@@ -50,7 +50,7 @@ Status ReadRecords(const InputFile& file, uint64_t begin, int64_t count, size_t 
   });
 }
 
-// Calls pack(first, last, bytes) likewise and writes what it made. The records begin at byte `begin`.
+// Calls pack(first, last, bytes) likewise and writes the bytes. Records start at byte `begin`.
 template <typename Pack>
 Status WriteRecords(const OutputFile& file, uint64_t begin, int64_t count, size_t record_size, Pack&& pack) {
   return internal::ForRecordBlocks(count, record_size, [&](int64_t first, int64_t last, uint8_t* bytes) {

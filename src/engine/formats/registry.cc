@@ -38,7 +38,7 @@ bool IsPly(std::string_view head) {
   return head.starts_with("ply") && head.find_first_of("\r\n") == head.find_first_not_of(" \t", 3);
 }
 
-// Whether it is the beginning of a JSON object, behind a byte order mark or blanks.
+// Whether it starts like a JSON object, after a byte order mark and whitespace.
 bool IsJsonObject(std::string_view head) {
   if (head.starts_with("\xef\xbb\xbf")) head.remove_prefix(3);
   const size_t first = head.find_first_not_of(" \t\r\n");
@@ -46,23 +46,23 @@ bool IsJsonObject(std::string_view head) {
 }
 bool Has(std::string_view head, std::string_view key) { return head.find(key) != head.npos; }
 
-// PlayCanvas's packed PLY keeps the ranges of its chunks in an element before the vertices.
+// PlayCanvas's compressed PLY has chunk ranges in an element before the vertices.
 bool IsCompressedPly(std::string_view head) { return IsPly(head) && head.find("\nelement chunk ") != head.npos; }
 
-// Version 4 begins with its own mark, earlier ones are gzip streams.
+// Version 4 has a magic number; earlier ones are gzip streams.
 bool IsSpz(std::string_view head) { return head.starts_with("NGSP") || head.starts_with("\x1f\x8b"); }
 
-// A ZIP archive, or the JSON file of a folder: the only one of our formats that speaks of means.
+// A ZIP archive, or a folder's JSON file: the only one of our formats with "means".
 bool IsSog(std::string_view head) {
   return head.starts_with("PK\x03\x04") || (IsJsonObject(head) && Has(head, "\"means\"") && Has(head, "\"quats\""));
 }
 
-// The JSON file that names the chunks of a scene.
+// The JSON file that lists the chunks of a scene.
 bool IsStreamedSog(std::string_view head) { return IsJsonObject(head) && Has(head, "\"lodLevels\""); }
 
-// NumPy's archive: a ZIP archive whose first member, whatever its name, is an array.
+// NumPy's archive: a ZIP archive whose first member, of any name, is an array.
 bool IsNpz(std::string_view head) {
-  constexpr size_t kNameSize = 26, kName = 30;  // in the header of a member
+  constexpr size_t kNameSize = 26, kName = 30;  // offsets in a member's header
   if (!head.starts_with("PK\x03\x04") || head.size() < kName) return false;
   const auto byte = [head](size_t at) { return static_cast<size_t>(static_cast<unsigned char>(head[at])); };
   return head.substr(kName, byte(kNameSize) + 256 * byte(kNameSize + 1)).ends_with(".npy");
@@ -70,7 +70,7 @@ bool IsNpz(std::string_view head) {
 
 bool IsGltf(std::string_view head) { return head.starts_with("glTF"); }
 
-// Its keys come in any order; a SOG has an "asset", too.
+// Keys come in any order; a SOG has an "asset" too.
 bool IsGltfJson(std::string_view head) {
   constexpr std::string_view kKeys[] = {"\"accessors\"", "\"bufferViews\"", "\"buffers\"", "\"meshes\"", "\"scenes\""};
   return IsJsonObject(head) && !IsSog(head) && Has(head, "\"asset\"") &&

@@ -23,7 +23,7 @@ namespace anchorsplat {
 struct ExtraProperties;
 struct Strays;
 
-// What a format can hold; writers clamp what is beyond. Half a step of the format wider than its last values.
+// Value range of a format, to which writers clamp: half a step beyond its extreme values.
 struct FormatRange {
   int sh_degree = kMaxShDegree;
   float log_scale_min = -std::numeric_limits<float>::infinity();
@@ -32,96 +32,94 @@ struct FormatRange {
   float harmonics = std::numeric_limits<float>::infinity();  // largest |coefficient| of degree 1–3
 };
 
-// What a file of the format says about the render mode.
+// What a format can record about the render mode.
 enum class ModeTag {
   kNone,
-  kCompensated,  // whether opacity is compensated, and not for which dilation: read as kAntialiased
+  kCompensated,  // whether opacity is compensated, but not the dilation: read as kAntialiased
   kEach,
 };
 
-// Which of a splat's comments go into a file of the format and come back.
+// Which comments of a splat a format stores.
 enum class CommentPlace {
   kNone,
-  kCredits,  // those that say whose it is or that it has all its width (core/splat_comments.h)
+  kCredits,  // credits and full-width marks (core/splat_comments.h)
   kAll,
 };
 
-// A splat format: how it is recognised, and a function for each direction that this version knows. A new format is one
-// file per direction and one row in registry.cc.
+// A splat format: how to recognise it, and functions to read and write it. A new format is one file per direction and
+// one row in registry.cc.
 struct SplatFormat {
   std::string_view name;           // "PLY", in messages: "is a … file"
-  std::string_view article = "a";  // that goes before the name as it is spoken
-  // Lower case; the longest match wins, so ".compressed.ply" goes before ".ply". Those without a dot in front are whole
-  // names.
+  std::string_view article = "a";  // indefinite article for the name as spoken
+  // Lower case; the longest match wins: ".compressed.ply" before ".ply". Entries without a leading dot are whole names.
   std::span<const std::string_view> extensions;
-  // Whether a file that begins with `head` (its first kSniffBytes bytes, or all) is of this format. Null where the
-  // format has no mark of its own: then the extension decides.
+  // Whether a file that starts with `head` (its first kSniffBytes bytes, or all) has this format. Null if the format
+  // has no magic number: the extension decides.
   bool (*sniff)(std::string_view head) = nullptr;
-  // Whether a file without any mark is of this format all the same, by what its beginning says of the rest. Asked where
-  // the name says a format that the file is not of. Null where `sniff` says it.
+  // Whether a file without magic number has this format judging by its values. Called if the name claims another
+  // format. Null if `sniff` suffices.
   bool (*looks_like)(const InputFile& file) = nullptr;
-  // How many Gaussians there are, by the header alone. Null where that is not known before the file is read.
+  // Count and degree from the header alone. Null if unknown before reading.
   Result<CloudExtent> (*extent)(const InputFile& file) = nullptr;
-  // What the file says about itself beside its Gaussians. Null where there is nothing.
+  // Properties of the file besides its Gaussians. Null if there are none.
   Result<FormatFacts> (*describe)(const InputFile& file) = nullptr;
-  // Bytes of the file and of those beside it that belong to it. Null: its own.
+  // Bytes of the file and those that belong to it. Null: only the file.
   uint64_t (*size)(const InputFile& file) = nullptr;
-  // Null: recognised, but not read or not written by this version.
+  // Null: recognised, but not read (or not written) by this version.
   Result<GaussianCloud> (*read)(const InputFile& file, const ReadLimits& limits) = nullptr;
-  // The same to look at block by block, with memory for few of them; null inside where this file cannot be read so, as
-  // where the format cannot. The file must outlive it.
+  // `read` block by block, with little memory. Null, or a null result, if the format or this file cannot be read so.
+  // The file must outlive it.
   Result<std::unique_ptr<CloudBlocks>> (*blocks)(const InputFile& file, const ReadLimits& limits) = nullptr;
-  // `read` and `write` with what a file says beside its Gaussians (extra_properties.h). Null where that has no place.
+  // `read` and `write` with extra properties (extra_properties.h). Null if the format cannot store them.
   Result<GaussianCloud> (*read_with_extras)(const InputFile& file, const ReadLimits& limits,
                                             ExtraProperties& extras) = nullptr;
   Status (*write)(const std::filesystem::path& path, const CloudView& cloud,
                   const CloudWriteOptions& options) = nullptr;
   Status (*write_with_extras)(const std::filesystem::path& path, const CloudView& cloud,
                               const CloudWriteOptions& options, const ExtraProperties& extras) = nullptr;
-  // It says every value of a Gaussian as it is stored. Others get those that nobody draws without opacity
-  // (hidden_rows.h), as what they can say of them might show.
+  // Stores every value of a Gaussian exactly. Other formats write unusable Gaussians without opacity (hidden_rows.h),
+  // as their approximations might be visible.
   bool keeps_all_values = false;
-  // Rows of the cloud in the order in which `write` puts them, where that is none of SplatOrder's and some may be left
-  // out. Null: WriteOrder (splat_order.h).
+  // Rows of the cloud in the order of `write`, if that is not a SplatOrder or rows may be dropped. Null: WriteOrder
+  // (splat_order.h).
   Buffer<uint32_t> (*written_rows)(const CloudView& cloud, const CloudWriteOptions& options) = nullptr;
-  // It writes more than one file whatever its name, those of `written_beside` aside.
+  // Always writes several files, not counting `written_beside`.
   bool several_files = false;
-  // Files that `write` makes beside the one it is told. Null: none.
+  // Files that `write` creates beside `path`. Null: none.
   std::vector<std::filesystem::path> (*written_beside)(const std::filesystem::path& path, int sh_degree) = nullptr;
-  // Bytes of the file `write` makes of a cloud without comments. Null where nothing can be said.
+  // Bytes that `write` needs for a cloud without comments. Null if unpredictable.
   uint64_t (*predicted_size)(int64_t count, int sh_degree) = nullptr;
-  // The prediction is what real splats take; values that compress better or worse take less or more.
+  // predicted_size is an estimate from real splats, as compression depends on the values.
   bool size_is_estimate = false;
-  // Of writing one with SH of degree 3 on one core, about: for what is said before the work begins.
+  // Rough time to write a Gaussian with SH degree 3 on one core, for messages before the work.
   double seconds_per_gaussian = 2e-7;
-  // The order in which `write` puts Gaussians by default.
+  // Default order of `write`.
   SplatOrder order = SplatOrder::kKeep;
-  // What the axes of its files are by its own convention.
+  // Axes by the format's convention.
   Axes axes = kRdf;
-  // What they are in this file, where it may say so. Null: `axes`.
+  // Axes declared by a file. Null: always `axes`.
   Result<Axes> (*declared_axes)(const InputFile& file) = nullptr;
   FormatRange range = {};
   ModeTag mode_tag = ModeTag::kNone;
   CommentPlace comments = CommentPlace::kNone;
-  bool keeps_origin = false;  // of the means (core/world_origin.h), or writes them in the world
-  // Gaussians that `write` cannot place without making others coarser than they are worth (strays.h): they are written
-  // without opacity. Null: it places all of them.
+  bool keeps_origin = false;  // stores the origin of means (core/world_origin.h), or world coordinates
+  // Gaussians to write without opacity because placing them would coarsen others too much (strays.h). Null: none.
   Strays (*strays)(const CloudView& cloud) = nullptr;
-  // A sentence where `write` must round the means of this cloud more coarsely than is usual, else nothing. May be null.
+  // A message if `write` must round the means of this cloud unusually coarsely, else empty. May be null.
   std::string (*mean_loss)(const CloudView& cloud) = nullptr;
 };
 
 inline constexpr size_t kSniffBytes = 4096;
 
-// All known formats; those with a more special mark first.
+// All known formats; those with a more specific magic number first.
 std::span<const SplatFormat> Formats();
 
-// By content first and extension second; null when neither is known.
+// Detects the format by content, then extension; null if unknown.
 const SplatFormat* FormatOfFile(std::string_view head, const std::filesystem::path& path);
-// The same of a file that is open, of which more can be asked. `name`: what tells its extension.
+// The same for an open file, which allows more checks. `name` gives the extension.
 Result<const SplatFormat*> FormatOfFile(const InputFile& file, const std::filesystem::path& name);
 const SplatFormat* FormatOfExtension(const std::filesystem::path& path);
-// By what people write for one: "spz", ".spz", ".compressed.ply", "meta.json"; null for what is none.
+// Looks up a name as users write it: "spz", ".spz", ".compressed.ply", "meta.json"; null if unknown.
 const SplatFormat* FormatOfName(std::string_view name);
 
 }  // namespace anchorsplat

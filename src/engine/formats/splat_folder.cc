@@ -17,10 +17,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Names of what a trainer writes at a step: "ckpt_", its number, "_rank", that of a process, ".pt"; in a folder, a file
-// of it.
+// Naming of a trainer's files per step: "ckpt_", step, "_rank", rank, ".pt"; for folders, the file inside.
 struct Steps {
-  const char* folder;  // of results; empty: they lie beside such folders
+  const char* folder;  // result folder; empty: files are beside such folders
   std::string_view before, rank, after;
   const char* inside;
 };
@@ -29,7 +28,7 @@ constexpr Steps kSteps[] = {{"point_cloud", "iteration_", "", "", "point_cloud.p
                             {"nerfstudio_models", "step-", "", ".ckpt", ""},
                             {"", "chkpnt", "", ".pth", ""}};
 
-// A step, and the number of a process (0 where names have none).
+// A step and rank (0 if names have none).
 using StepAndRank = std::pair<int64_t, int64_t>;
 
 std::optional<int64_t> TakeNumber(std::string_view& text) {
@@ -50,7 +49,7 @@ std::optional<StepAndRank> StepOf(const Steps& steps, std::string_view name) {
   return rank && name == steps.after ? std::optional(StepAndRank(*step, *rank)) : std::nullopt;
 }
 
-// Files in this folder by their steps, of several processes the lowest.
+// Files in a folder by step, with the lowest rank.
 std::map<int64_t, fs::path> FilesIn(const fs::path& folder, const Steps& steps) {
   std::map<StepAndRank, fs::path> found;
   std::error_code failed;
@@ -66,7 +65,7 @@ std::map<int64_t, fs::path> FilesIn(const fs::path& folder, const Steps& steps) 
   return files;
 }
 
-// Of the steps in this folder; nothing where there are none.
+// The latest step in a folder; none if there are no steps.
 std::optional<FoundSplat> LatestIn(const fs::path& folder, const Steps& steps) {
   std::map<int64_t, fs::path> found = FilesIn(folder, steps);
   if (found.empty()) return std::nullopt;
@@ -79,7 +78,7 @@ std::optional<FoundSplat> LatestIn(const fs::path& folder, const Steps& steps) {
   return latest;
 }
 
-// Checkpoints that lie beside the folder of results which the splat is of.
+// Checkpoints beside the result folder of this splat.
 std::string CheckpointsIn(const fs::path& folder) {
   std::string names;
   for (const auto& [step, file] : FilesIn(folder, kSteps[std::size(kSteps) - 1])) {

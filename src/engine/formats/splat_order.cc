@@ -20,7 +20,7 @@ template <typename Key>
 struct Keyed {
   Key key;
   uint32_t row;
-  // A total order, so that the result does not depend on how the sort was split among threads.
+  // A total order, so that the result does not depend on threads.
   bool operator<(const Keyed& other) const { return key != other.key ? key < other.key : row < other.row; }
 };
 
@@ -38,7 +38,7 @@ Buffer<uint32_t> OrderBy(int64_t count, KeyOf&& key_of) {
   return rows;
 }
 
-// The 21 low bits of x with two zero bits after each.
+// The 21 low bits of x, each followed by two zero bits.
 uint64_t SpreadBits(uint64_t x) {
   x = (x | x << 32) & 0x001f00000000ffff;
   x = (x | x << 16) & 0x001f0000ff0000ff;
@@ -49,7 +49,7 @@ uint64_t SpreadBits(uint64_t x) {
 
 enum class Part : uint8_t { kNear, kFarOut, kNobodyDraws };
 
-// Where the curve lies: its first cell, and cells per world unit.
+// Placement of the curve: its first cell, and cells per world unit.
 struct Curve {
   static constexpr double kCells = 1 << 21;
   double origin[3] = {0, 0, 0}, scale[3] = {0, 0, 0};
@@ -64,7 +64,7 @@ struct Curve {
   }
 };
 
-// Along one curve through the box of all that is near, then along one through that of what is far out.
+// Along a curve through the box of the near Gaussians, then along one through that of the strays.
 template <typename PartOf>
 Buffer<uint32_t> OrderAlongCurve(std::span<const float> means, PartOf&& part_of) {
   const int64_t count = std::ssize(means) / 3;
@@ -120,7 +120,7 @@ Buffer<uint32_t> ImportanceOrder(const CloudView& cloud) {
     if (!IsDrawn(cloud, i)) return std::numeric_limits<float>::infinity();
     const float* s = cloud.log_scales.data() + 3 * i;
     const float logit = cloud.opacity_logits[static_cast<size_t>(i)];
-    // Flat Gaussians (a log-scale of −Inf) are seen all the same.
+    // Flat Gaussians (log-scale −Inf) are visible too.
     const auto bounded = [](float log_scale) { return std::max(log_scale, -20.0f); };
     return -(bounded(s[0]) + bounded(s[1]) + bounded(s[2]) + LogSigmoid(logit));
   });

@@ -9,21 +9,19 @@
 
 namespace anchorsplat {
 
-// Orders in which a cloud is written, as row numbers. Ties keep the order of the cloud; rows that nobody
-// draws come last. Errors do not exist: any cloud has every order.
+// Orders for writing a cloud, as row numbers. Ties keep the cloud's order; unusable rows come last. These cannot fail.
 
-// Along a Morton (Z-order) curve of 2²¹ cells per axis through their box, so that neighbours in the file are neighbours
-// in space: ranges of chunks become small and general compressors find more. What is far out (strays.h) follows along a
-// curve of its own: no chunk with it in has more of the others than it must.
+// Along a Morton (Z-order) curve with 2²¹ cells per axis of the bounding box, so that neighbours in the file are
+// neighbours in space: chunks have small ranges, and compressors find more redundancy. Strays (strays.h) follow on a
+// separate curve, so that they share chunks with as few others as possible.
 Buffer<uint32_t> MortonOrder(const CloudView& cloud);
-// The same of places alone, [N,3], all finite.
+// The same for positions [N,3], all finite.
 Buffer<uint32_t> MortonOrder(std::span<const float> means);
 
-// By size × opacity, largest first: exp(Σ log-scales) · sigmoid(logit), what viewers that show a file while it loads
-// want to have first.
+// By size × opacity, exp(Σ log-scales) · sigmoid(logit), largest first: for viewers that show a file while it loads.
 Buffer<uint32_t> ImportanceOrder(const CloudView& cloud);
 
-// The order a writer uses: `asked`, or what the format likes. Empty: as in the cloud.
+// The order for a writer: `asked`, or the format's default. Empty: unchanged.
 Buffer<uint32_t> WriteOrder(const CloudView& cloud, SplatOrder asked, SplatOrder of_format);
 
 }  // namespace anchorsplat

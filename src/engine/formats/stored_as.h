@@ -7,19 +7,19 @@
 
 namespace anchorsplat {
 
-// What a file's numbers mean where a program wrote others than the format wants.
+// Actual meaning of a file's numbers, if a program deviated from the format.
 struct StoredAs {
-  bool lengths = false;    // scales, instead of their logarithms
-  bool opacities = false;  // 0–1, instead of logits
-  float color_of_one = 0;  // f_dc are colours of which this is the largest, 1 or 255, instead of harmonics; 0: they are
+  bool lengths = false;    // scales are lengths, not logarithms
+  bool opacities = false;  // opacities are 0–1, not logits
+  float max_color = 0;     // f_dc are colours up to this value, 1 or 255; 0: harmonics
   friend bool operator==(const StoredAs&, const StoredAs&) = default;
 };
 
-// Makes such numbers of a cloud what they ought to be. In place. `full_color`: the reader has made harmonics of colours
-// already and took this for their largest (ExtraProperties); 0: they are as stored.
-void MakeStored(GaussianCloud& cloud, const StoredAs& stored, float full_color = 0);
+// Converts such a cloud to stored space, in place. `full_color`: the reader already converted colours with this full
+// intensity (ExtraProperties); 0: as stored.
+void ConvertToStored(GaussianCloud& cloud, const StoredAs& stored, float full_color = 0);
 
-// Warns where they look so, and `told` does not say it. `name`: the file, for people.
+// Warns if the values look like that and `told` does not say so. `name`: the file, for messages.
 void WarnOfStored(const std::string& name, const CloudView& cloud, const StoredAs& told);
 
 }  // namespace anchorsplat

@@ -20,7 +20,7 @@ double ReachOf(const CloudView& cloud, int64_t row) {
   return double{std::max({std::fabs(p[0]), std::fabs(p[1]), std::fabs(p[2])})};
 }
 
-// What is seen, by the size of the Gaussians in units of their grain: powers of two.
+// Visible weight by size in units of the grain, in powers of two.
 class SeenBySize {
  public:
   void Add(double size, double weight) {
@@ -55,7 +55,7 @@ double SizeOf(const CloudView& cloud, int64_t row) {
   return std::exp(0.5 * std::max({double{s[0]} + s[1], double{s[0]} + s[2], double{s[1]} + s[2]}));
 }
 
-double SeenWeight(const CloudView& cloud, int64_t row, const Framing& framing) {
+double VisibleWeight(const CloudView& cloud, int64_t row, const Framing& framing) {
   if (!IsDrawn(cloud, row)) return 0;
   const float* p = cloud.means.data() + 3 * row;
   const double away = std::hypot(p[0] - framing.target[0], p[1] - framing.target[1], p[2] - framing.target[2]);
@@ -64,8 +64,8 @@ double SeenWeight(const CloudView& cloud, int64_t row, const Framing& framing) {
 }
 
 double RoundingLoss(double step, double size) {
-  const double off = step / size;  // an error of half a step, of half a size
-  return off < 1 ? off * off : 1;  // 1 of a point, too
+  const double off = step / size;  // half a step relative to half a size
+  return off < 1 ? off * off : 1;  // also 1 for a point
 }
 
 std::optional<Framing> FramingWithFarOut(const CloudView& cloud) {
@@ -73,23 +73,23 @@ std::optional<Framing> FramingWithFarOut(const CloudView& cloud) {
   if (!bounds) return std::nullopt;
   double widest = 0;
   for (size_t a = 0; a < 3; ++a) widest = std::max(widest, double{bounds->max[a]} - double{bounds->min[a]});
-  // Ten radii of half of them reach as far.
+  // Ten radii of half of them reach that far.
   constexpr double kNearEnough = 10;
   if (widest <= kNearEnough * double{FindMiddleOfMeans(cloud, 0.5).extent}) return std::nullopt;
   return FrameMeans(cloud);
 }
 
-Strays FarthestToGiveUp(const CloudView& cloud, const std::function<double(double)>& step,
-                        const std::function<double(double)>& grain) {
+Strays ChooseStrays(const CloudView& cloud, const std::function<double(double)>& step,
+                    const std::function<double(double)>& grain) {
   Strays strays;
   const std::optional<Framing> framing = FramingWithFarOut(cloud);
   if (!framing) return strays;
   std::vector<FarRow> far;
   SeenBySize seen;
-  double rest = 0;  // reach of those that are not far out
+  double rest = 0;  // reach of the near ones
   for (int64_t i = 0; i < cloud.size(); ++i) {
     if (!HasUsableShape(cloud, i)) continue;
-    const double weight = SeenWeight(cloud, i, *framing), reach = ReachOf(cloud, i);
+    const double weight = VisibleWeight(cloud, i, *framing), reach = ReachOf(cloud, i);
     seen.Add(SizeOf(cloud, i) / grain(reach), weight);
     if (IsFarOut(*framing, cloud.means.data() + 3 * i)) {
       far.push_back({reach, weight, i});
@@ -106,7 +106,7 @@ Strays FarthestToGiveUp(const CloudView& cloud, const std::function<double(doubl
     if (finest < 0.9 * last || k == far.size()) {
       last = finest;
       const double loss = seen.Loss(finest) + given_up;
-      if (k == 0 && loss <= kLossThatShows * seen.total()) return strays;
+      if (k == 0 && loss <= kVisibleLoss * seen.total()) return strays;
       if (loss < least) {
         least = loss;
         best = k;

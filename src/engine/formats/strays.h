@@ -10,31 +10,31 @@
 
 namespace anchorsplat {
 
-// A format that spends its few bits for positions on the way to what is far out has none left for all others. Which of
-// the two is the smaller loss is weighed here: Gaussians count by what of a view from the middle they cover, and a
-// rounded position costs as much of that as it is of the Gaussian's own size.
+// Formats with few bits for positions lose precision everywhere if they must reach distant Gaussians. Which loss is
+// smaller is decided here: Gaussians weigh by the area they cover as seen from the middle, and rounding a position
+// costs the fraction of that weight by which it shifts the Gaussian relative to its size.
 
-// Rows that are given up so that the others stay where they are, and the largest distance of one from the middle.
+// Rows to hide so that the others stay precise, and the largest distance of one from the middle.
 struct Strays {
   Buffer<int64_t> rows;  // ascending
   double farthest = 0;   // world units
 };
 
-// The framing of a cloud of which a Gaussian may be far out (IsFarOut); nothing where that is plain to see without.
+// The framing of a cloud that may have distant Gaussians (IsFarOut); none if it obviously has none.
 std::optional<Framing> FramingWithFarOut(const CloudView& cloud);
 
-// Opacity × area as seen from the middle, with its radius as the least distance; 0 of what is not drawn.
-double SeenWeight(const CloudView& cloud, int64_t row, const Framing& framing);
-// Middle length of the two longest axes, world units.
+// Opacity × area seen from the middle, with the framing's radius as minimum distance; 0 if not drawn.
+double VisibleWeight(const CloudView& cloud, int64_t row, const Framing& framing);
+// Geometric mean of the two longest axes, world units.
 double SizeOf(const CloudView& cloud, int64_t row);
-// Share of a Gaussian of `size` that is lost where its position is rounded to multiples of `step`, 0–1.
+// Fraction (0–1) of a Gaussian of `size` lost by rounding its position to multiples of `step`.
 double RoundingLoss(double step, double size);
-// Losses below this share of all that is seen are no reason to give up a Gaussian.
-inline constexpr double kLossThatShows = 0.05;
+// Gaussians are hidden only if that saves more than this fraction of the visible total.
+inline constexpr double kVisibleLoss = 0.05;
 
-// For a format with one range for all positions: what to give up of the farthest ones. Positions whose coordinates have
-// magnitudes of at most `reach` are rounded to multiples of step(reach) · grain(own reach).
-Strays FarthestToGiveUp(const CloudView& cloud, const std::function<double(double)>& step,
-                        const std::function<double(double)>& grain);
+// For formats with one range for all positions: the most distant Gaussians to hide. Coordinates up to `reach` are
+// rounded to multiples of step(reach) · grain(own reach).
+Strays ChooseStrays(const CloudView& cloud, const std::function<double(double)>& step,
+                    const std::function<double(double)>& grain);
 
 }  // namespace anchorsplat

@@ -29,17 +29,17 @@ Error Bad(const InputFile& file, const std::string& what) {
   return {ErrorCode::kBadFile, Cat(file.name(), ": ", what)};
 }
 
-// An archive of anything, and not one of those that formats know by their beginning.
+// A general archive, not one that a format recognises by its start.
 bool IsPlainZip(std::string_view head) {
   if (!head.starts_with("PK\x03\x04") && !head.starts_with("PK\x05\x06")) return false;
   const SplatFormat* const format = FormatOfFile(head, {});
   return format == nullptr || format->name == "SOG";
 }
 
-// Up to version 3 an SPZ is a gzip stream itself.
+// An SPZ up to version 3 is itself a gzip stream.
 Result<bool> IsSpzItself(const InputFile& file) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string inside, HeadInside(file, Packing::kGzip, 8));
-  return inside.size() == 8 && inside.starts_with("NGSP") && LoadLittle<uint32_t>(inside.data() + 4) < 4;
+  return inside.size() == 8 && inside.starts_with("NGSP") && LoadLittleEndian<uint32_t>(inside.data() + 4) < 4;
 }
 
 bool IsRead(const fs::path& name) {
@@ -47,7 +47,7 @@ bool IsRead(const fs::path& name) {
   return format != nullptr && format->read != nullptr;
 }
 
-// What systems put into an archive beside what people do.
+// Files that operating systems add to archives.
 bool IsSystems(const std::string& member) {
   return member.ends_with('/') || member.starts_with("__MACOSX/") ||
          fs::path(member).filename().string().starts_with('.');
@@ -60,7 +60,7 @@ std::string Listed(const std::vector<std::string>& names) {
   return names.size() > kMost ? Cat(list, " and ", names.size() - kMost, " more") : list;
 }
 
-// The member of an archive that is a splat; nothing where the archive itself is one.
+// The splat member of an archive; none if the archive itself is a splat.
 Result<std::optional<std::string>> SplatIn(const InputFile& file, const ZipReader& archive) {
   std::vector<std::string> members = archive.Members();
   std::erase_if(members, IsSystems);
@@ -70,7 +70,7 @@ Result<std::optional<std::string>> SplatIn(const InputFile& file, const ZipReade
   if (FolderOfSog(members)) return std::optional<std::string>();
   std::vector<std::string> splats;
   std::ranges::copy_if(members, std::back_inserter(splats), [](const std::string& name) { return IsRead(name); });
-  if (splats.empty() && members.size() == 1) splats = members;  // whatever it is called
+  if (splats.empty() && members.size() == 1) splats = members;  // whatever its name
   if (splats.size() == 1) return std::optional(splats.front());
   if (members.empty()) return Bad(file, "is an empty ZIP archive");
   if (splats.empty()) return Bad(file, Cat("is a ZIP archive without a splat; in it are ", Listed(members)));
@@ -78,21 +78,21 @@ Result<std::optional<std::string>> SplatIn(const InputFile& file, const ZipReade
                        "): unpack it and give one of them"));
 }
 
-Result<std::optional<UnwrappedSplat>> TakeOutOfZip(const InputFile& file, uint64_t paid) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string_view bytes, file.Whole(kLargestArchive));
+Result<std::optional<UnwrappedSplat>> TakeOutOfZip(const InputFile& file, uint64_t compressed_size) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string_view bytes, file.Contents(kLargestArchive));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ZipReader archive, ZipReader::View(file.name(), bytes));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<std::string> member, SplatIn(file, archive));
   if (!member) return std::optional<UnwrappedSplat>();
   const fs::path name = fs::path(*member).filename();
   const uint64_t size = archive.SizeOf(*member);
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(file.name(), paid, size));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckCompressionRatio(file.name(), compressed_size, size));
   ANCHORSPLAT_ASSIGN_OR_RETURN(std::string contents, archive.Read(*member, size));
-  // What lies beside the archive is not what lies beside its member.
+  // Files beside the archive do not belong to its member.
   InputFile inside = InputFile::FromBytes(Cat(file.name(), ": ", Printable(*member)), std::move(contents));
   return std::optional(UnwrappedSplat{std::move(inside), name, Cat("ZIP archive around ", Printable(*member))});
 }
 
-Result<std::optional<UnwrappedSplat>> TakeOff(const UnwrappedSplat& outer, uint64_t paid) {
+Result<std::optional<UnwrappedSplat>> TakeOff(const UnwrappedSplat& outer, uint64_t compressed_size) {
   const InputFile& file = outer.file;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(kSniffBytes));
   if (const Packing packing = PackingOf(head); packing != Packing::kNone) {
@@ -100,7 +100,7 @@ Result<std::optional<UnwrappedSplat>> TakeOff(const UnwrappedSplat& outer, uint6
       ANCHORSPLAT_ASSIGN_OR_RETURN(const bool is_spz, IsSpzItself(file));
       if (is_spz) return std::optional<UnwrappedSplat>();
     }
-    ANCHORSPLAT_ASSIGN_OR_RETURN(InputFile inside, Unpack(file, packing, paid));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(InputFile inside, Unpack(file, packing, compressed_size));
     fs::path name = WithoutPacking(outer.name);
     const std::string said = packing == Packing::kGzip ? NameInGzip(head) : "";
     if (!said.empty() && FormatOfExtension(name) == nullptr) name = fs::path(said).filename();
@@ -108,7 +108,7 @@ Result<std::optional<UnwrappedSplat>> TakeOff(const UnwrappedSplat& outer, uint6
     return std::optional(UnwrappedSplat{std::move(inside), std::move(name), packed});
   }
   if (!IsPlainZip(head)) return std::optional<UnwrappedSplat>();
-  return TakeOutOfZip(file, paid);
+  return TakeOutOfZip(file, compressed_size);
 }
 
 struct Kind {
@@ -133,7 +133,7 @@ constexpr Kind kKinds[] = {
     {"version https://git-lfs", "is a pointer of Git LFS and not the file itself: git lfs pull fetches it"},
     {"/annex/objects/", "is a pointer of git-annex and not the file itself: git annex get fetches it"},
 };
-// Behind blanks, in any case.
+// Skips whitespace and ignores case.
 constexpr Kind kTexts[] = {
     {"<!doctype html", "is a web page and no splat: what was to be downloaded may need a login, or another address"},
     {"<html", "is a web page and no splat: what was to be downloaded may need a login, or another address"},
@@ -164,12 +164,12 @@ bool IsWrapped(const InputFile& file) {
 }
 
 Result<UnwrappedSplat> Unwrap(InputFile input) {
-  const uint64_t paid = input.size();
+  const uint64_t compressed_size = input.size();
   fs::path name = input.path().filename();
   UnwrappedSplat found{std::move(input), std::move(name), {}};
   std::string packed;
   for (int wraps = 0;; ++wraps) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(std::optional<UnwrappedSplat> inside, TakeOff(found, paid));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(std::optional<UnwrappedSplat> inside, TakeOff(found, compressed_size));
     if (!inside) break;
     if (wraps == kMostWraps) return Bad(found.file, "is packed more than twice: unpack it first");
     packed += Cat(packed.empty() ? "" : ", in it ", inside->packed);
@@ -183,7 +183,7 @@ bool IsText(std::string_view head) {
   return std::ranges::all_of(head, [](unsigned char c) { return c >= ' ' || c == '\t' || c == '\n' || c == '\r'; });
 }
 
-std::string WhatElse(std::string_view head) {
+std::string DescribeNonSplat(std::string_view head) {
   for (const auto& [mark, what] : kKinds) {
     if (head.starts_with(mark)) return what;
   }

@@ -9,30 +9,30 @@
 
 namespace anchorsplat {
 
-// A splat file without what was around it.
+// A splat file after removing compression.
 struct UnwrappedSplat {
   InputFile file;
-  std::filesystem::path name;  // what tells its extension: "scan.ply" of scan.ply.gz, the name that an archive says
-  std::string packed;          // for people: "gzip around 3.4 MB"; empty: there was nothing around it
+  // name with the extension: "scan.ply" for scan.ply.gz, or the member's name in an archive
+  std::filesystem::path name;
+  std::string packed;  // for messages: "gzip around 3.4 MB"; empty if nothing was removed
 };
 
-// Takes gzip, zstd and ZIP archives of one splat away, two of them at most. They are recognised by content, and what
-// formats are made of themselves stays: the gzip stream of an SPZ, the archives of SOG, NPZ and PyTorch.
+// Removes gzip, zstd and ZIP archives of one splat, at most two layers. They are recognised by content; compression
+// that is part of a format stays: the gzip stream of SPZ, the archives of SOG, NPZ and PyTorch.
 //
-// Errors (kBadFile): damaged, cut off, a decompression bomb, an archive of no splat or of several, whose names are
-// said.
+// Errors (kBadFile): damaged, truncated, a decompression bomb, an archive with no splat or several, which are named.
 Result<UnwrappedSplat> Unwrap(InputFile input);
 
-// "scan.ply" of "scan.ply.gz", "scan" of "scan.zip"; other names as they are.
+// "scan.ply" for "scan.ply.gz", "scan" for "scan.zip"; other names are unchanged.
 std::filesystem::path WithoutPacking(const std::filesystem::path& name);
 
-// Whether Unwrap has something to take away, or all of the file to look at for it.
+// Whether Unwrap would remove something, or needs the whole file to tell.
 bool IsWrapped(const InputFile& file);
 
-// What people take for a splat, by its first bytes, with what to do: "is a web page and no splat"; empty for anything
-// that may be one.
-std::string WhatElse(std::string_view head);
-// Whether all of it can be read by people, as an answer of a server in place of a file.
+// Describes common non-splat files by their first bytes, with what to do: "is a web page and no splat"; empty for
+// anything that may be a splat.
+std::string DescribeNonSplat(std::string_view head);
+// Whether `head` is readable text, such as a server's response instead of a file.
 bool IsText(std::string_view head);
 
 }  // namespace anchorsplat

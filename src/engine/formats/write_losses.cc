@@ -19,7 +19,7 @@ namespace {
 
 constexpr int64_t kLossGrain = 1 << 14;
 
-// Gaussians that are drawn and have a value that the format clamps.
+// Number of drawn Gaussians with a value that the format clamps.
 struct Clamped {
   int64_t log_scales = 0, colors = 0, harmonics = 0;
 };
@@ -56,7 +56,7 @@ Clamped CountClamped(const FormatRange& range, const CloudView& cloud, int sh_de
 // "an SPZ file".
 std::string AFileOf(const SplatFormat& format) { return Cat(format.article, " ", format.name, " file"); }
 
-// Licences ask for credits wherever a splat goes; of other comments it is enough that the documentation says so.
+// Licences require credits to stay with a splat; losing other comments is only documented.
 std::string CreditLoss(const SplatFormat& format, std::span<const std::string> comments) {
   const std::vector<std::string> credits = CreditsOf(comments);
   if (credits.empty() || format.comments != CommentPlace::kNone) return {};
@@ -65,7 +65,7 @@ std::string CreditLoss(const SplatFormat& format, std::span<const std::string> c
   return Cat(AFileOf(format), " has no place for credits: give ", list, " beside it");
 }
 
-// Read back, the splat looks or may look as if it had lost width.
+// Read back, the splat may look as if it had lost width.
 std::string MarkLoss(const SplatFormat& format, std::span<const std::string> comments) {
   if (format.comments != CommentPlace::kNone) return {};
   if (std::ranges::none_of(comments, IsMark)) return {};
@@ -77,14 +77,14 @@ std::string MarkLoss(const SplatFormat& format, std::span<const std::string> com
                  : "been fitted to the areas of pixels: enhance that file, and it becomes worse (keep a PLY for that)");
 }
 
-// What an SPZ said that comments keep, and an SPZ takes again.
+// SPZ records kept in comments, which only SPZ stores.
 std::string SpzRecordLoss(const SplatFormat& format, std::span<const std::string> comments) {
   if (format.comments == CommentPlace::kAll || format.declared_axes == DeclaredAxesOfSpz) return {};
   const std::string names = NamesOfSpzExtensions(comments);
   return names.empty() ? std::string() : Cat(AFileOf(format), " has no place for ", names, ": dropped");
 }
 
-// Programs that read such a file take the usual axis for it.
+// Readers of such a file assume the usual axis.
 std::string UpLoss(const SplatFormat& format, std::span<const std::string> comments) {
   const auto up = UpOf({comments.begin(), comments.end()});
   if (!up || *up == kUsualUp || format.comments != CommentPlace::kNone) return {};
@@ -92,7 +92,7 @@ std::string UpLoss(const SplatFormat& format, std::span<const std::string> comme
              ": programs will take the usual axis for it (--coords of convert turns a splat)");
 }
 
-// Without its tag a splat is drawn as a classic one.
+// Without its tag, a splat is drawn as classic.
 std::string ModeLoss(const SplatFormat& format, std::optional<RenderMode> mode) {
   if (!IsCompensated(mode) || format.mode_tag == ModeTag::kEach) return {};
   const std::string_view name = NameOf(*mode);

@@ -8,14 +8,13 @@
 
 namespace anchorsplat {
 
-// What of this cloud a format has no place for, beyond the rounding that every cloud gets (docs/formats.md): harmonics
-// that are dropped, values that are clamped to the format's range, a render mode that it cannot say, credits that it
-// has no place for, means that are made coarse by where they are. A sentence each, for people; nothing when all is
-// well. WriteCloud says them as warnings. What nobody draws is not counted.
+// Messages about losses in a format beyond the rounding of every cloud (docs/formats.md): dropped harmonics, clamped
+// values, a render mode or credits it cannot store, means that are coarse due to their location. One sentence each;
+// empty if there is no loss. WriteCloud logs them as warnings. Unusable Gaussians are not counted.
 std::vector<std::string> WriteLosses(const SplatFormat& format, const CloudView& cloud);
 
-// Largest side of a box that holds the middle of the means on every axis, 98 % of them or another share, and its
-// farthest coordinate from zero; estimated from at most 65,536 of them. Zeros when none is usable.
+// Largest side of the box around the middle `share` of the means on every axis, and its largest coordinate magnitude;
+// estimated from at most 65,536 means. Zeros if none is usable.
 struct MiddleOfMeans {
   float extent = 0, farthest = 0;  // world units
 };

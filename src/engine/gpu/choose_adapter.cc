@@ -23,7 +23,7 @@ int Rank(const GpuAdapter& adapter) {
   return 3;
 }
 
-// One card may be there several times, by several drivers; OpenGL is every card's last resort.
+// A card may be listed once per driver; OpenGL is the last resort for each.
 bool ByOpenGl(const GpuAdapter& adapter) { return adapter.backend.starts_with("OpenGL"); }
 
 }  // namespace

@@ -8,8 +8,8 @@
 
 namespace anchorsplat {
 
-// Index in `adapters`, which are as ListGpuAdapters gives them, of the one that the choice names (OpenGpu says how).
-// Errors (kNotFound): there is none.
+// Index in `adapters` (in the order of ListGpuAdapters) of the adapter that `choice` selects by the rules of OpenGpu.
+// kNotFound: none.
 Result<size_t> ChooseAdapter(const std::vector<GpuAdapter>& adapters, const DeviceChoice& choice);
 
 }  // namespace anchorsplat

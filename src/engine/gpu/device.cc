@@ -7,7 +7,7 @@
 
 namespace anchorsplat {
 
-Status GpuRoom(GpuDevice& device, GpuMemory& memory, uint64_t bytes, std::string_view what) {
+Status EnsureGpuMemory(GpuDevice& device, GpuMemory& memory, uint64_t bytes, std::string_view what) {
   bytes = std::max<uint64_t>(bytes, 4);
   if (memory != nullptr && memory->bytes() >= bytes) return {};
   const GpuAdapter& adapter = device.adapter();
@@ -17,7 +17,7 @@ Status GpuRoom(GpuDevice& device, GpuMemory& memory, uint64_t bytes, std::string
                  Cat(what, " would take ", WithThousands(static_cast<int64_t>(bytes)),
                      " bytes in one piece, and the GPU allows ", WithThousands(static_cast<int64_t>(largest)))};
   }
-  memory.reset();  // first, as there may not be memory for both
+  memory.reset();  // free first: there may be no room for both
   Result<GpuMemory> made = device.Allocate(std::min(largest, bytes + bytes / 8), what);
   if (!made.ok()) made = device.Allocate(bytes, what);
   if (!made.ok()) return made.error();

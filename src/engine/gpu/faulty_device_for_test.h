@@ -13,14 +13,14 @@
 
 namespace anchorsplat {
 
-// What goes wrong on a FaultyDevice; by default nothing.
+// Faults of a FaultyDevice; none by default.
 struct GpuFaults {
-  int calls = -1;            // of Write, Clear, Copy and Run that work; then the device is lost. -1: all
-  int allocations = -1;      // that work; then there is no memory left, which does not stick. -1: all
-  uint64_t max_binding = 0;  // bytes that the adapter claims, and more in Run is a failure; 0: as many as it has
+  int calls = -1;            // number of Write, Clear, Copy and Run calls until the device is lost; -1: never
+  int allocations = -1;      // number of successful allocations; later ones fail (not sticky); -1: all succeed
+  uint64_t max_binding = 0;  // claimed max_binding in bytes, beyond which Run fails; 0: the real one
 };
 
-// A device on which something goes wrong on purpose, in front of one that works. Buffers are the other's.
+// Wraps a working device and injects faults. Buffers belong to the wrapped one.
 class FaultyDevice final : public GpuDevice {
  public:
   FaultyDevice(std::shared_ptr<GpuDevice> gpu, const GpuFaults& faults)
@@ -67,7 +67,7 @@ class FaultyDevice final : public GpuDevice {
   double seconds() const override { return gpu_->seconds(); }
   int64_t waits() const override { return gpu_->waits(); }
 
-  // So far, for tests that let each of them fail.
+  // Counts so far, for tests that make each call fail in turn.
   int calls() const { return calls_; }
   int allocations() const { return allocations_; }
   int64_t bytes_written() const { return bytes_written_; }

@@ -14,7 +14,7 @@
 
 namespace anchorsplat {
 
-// The device of tests, of whatever type; null and a failed test where there is none.
+// A device for tests, of any type; fails the test and returns null if there is none.
 inline std::shared_ptr<GpuDevice> GpuForTest() {
   Result<std::shared_ptr<GpuDevice>> opened = OpenGpu({DeviceChoice::Kind::kGpu});
   if (opened.ok()) return *opened;
@@ -24,8 +24,8 @@ inline std::shared_ptr<GpuDevice> GpuForTest() {
   return nullptr;
 }
 
-// While it lives, GpuOfRun() of this thread's run returns the device instead of opening one, unless the run's choice is
-// the CPU or it has given up. What it has given up before does not count.
+// While it lives, GpuOfRun() of this thread's run returns the given device, unless the run chose the CPU or gave up the
+// GPU. Resets an earlier give-up.
 class ScopedGpuForTest {
  public:
   explicit ScopedGpuForTest(std::shared_ptr<GpuDevice> gpu)

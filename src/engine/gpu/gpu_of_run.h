@@ -11,13 +11,13 @@
 
 namespace anchorsplat::internal {
 
-// What GpuOfRun and GiveUpGpu (open_gpu.h) know of a run.
+// State of GpuOfRun and GiveUpGpu (open_gpu.h) in a run.
 struct GpuStateOfRun {
   std::mutex mutex;
-  std::string given_up;                    // why; empty: not
-  std::optional<DeviceChoice> opened_for;  // the choice that `opened` answers
+  std::string given_up;                    // reason; empty: not given up
+  std::optional<DeviceChoice> opened_for;  // the choice that led to `opened`
   std::optional<Result<std::shared_ptr<GpuDevice>>> opened;
-  std::shared_ptr<GpuDevice> for_test;  // instead of what would be opened
+  std::shared_ptr<GpuDevice> for_test;  // returned instead of `opened`
 };
 
 }  // namespace anchorsplat::internal

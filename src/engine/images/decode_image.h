@@ -8,7 +8,7 @@
 
 namespace anchorsplat {
 
-// ReadImage (images/image_io.h) of bytes that are in memory; `name` is what messages call them. Errors: kBadFile.
+// ReadImage (images/image_io.h) for bytes in memory; `name` is used in messages. Errors: kBadFile.
 Result<Image> DecodeImage(const std::string& name, std::string_view bytes);
 
 }  // namespace anchorsplat

@@ -20,7 +20,7 @@ namespace {
 
 enum class PictureKind { kPng, kJpeg, kWebp, kTiff };
 
-// What a file that is no picture for us is, by its first bytes, for those that people try; empty: unknown.
+// Names the type of a file that is not a supported image, from its first bytes, for common mistakes; empty: unknown.
 std::string OtherKind(std::string_view head) {
   if (head.size() >= 12 && head.substr(4, 4) == "ftyp") {
     const std::string_view brand = head.substr(8, 4);
@@ -42,7 +42,7 @@ std::string OtherKind(std::string_view head) {
   return "";
 }
 
-// By the first bytes; leaves the file at its beginning.
+// Detects the type by the first bytes; leaves the file at its beginning.
 Result<PictureKind> DetectKind(const OpenedFile& file, const std::string& name) {
   char bytes[16] = {};
   const std::string_view head(bytes, std::fread(bytes, 1, sizeof bytes, file.handle.get()));
@@ -87,7 +87,7 @@ Result<Image> ReadImage(const std::filesystem::path& path) {
 Result<Image> DecodeImage(const std::string& name, std::string_view bytes) {
   OpenedFile file;
   file.size = bytes.size();
-  // Opened for reading only, so that nobody writes through the pointer. No bytes make no file everywhere.
+  // Read-only, so the pointer is never written through. Zero bytes are not a file on every system.
   if (!bytes.empty()) file.handle.reset(::fmemopen(const_cast<char*>(bytes.data()), bytes.size(), "rb"));
   if (!file.handle) return Error{ErrorCode::kBadFile, Cat(name, ": byte 0: neither a PNG nor a JPEG, WebP or TIFF")};
   return Decode(file, name);

@@ -19,10 +19,10 @@ namespace anchorsplat {
 
 namespace {
 
-// A progressive file may repeat its scans without end, each costing a pass over the picture; encoders write about ten.
+// A progressive file may repeat scans endlessly, each a pass over the image; encoders write about ten.
 constexpr int kMaxScans = 200;
 
-// libjpeg jumps like libpng: everything with a destructor is owned from outside of setjmp.
+// libjpeg reports errors by longjmp, like libpng: objects with destructors live outside of setjmp.
 struct JpegReader {
   jpeg_decompress_struct info{};
   jpeg_error_mgr errors{};
@@ -42,11 +42,11 @@ struct JpegReader {
   std::longjmp(reader->jump, 1);
 }
 
-// libjpeg calls damaged data a warning and fills the rest with grey; a picture that is partly made up is an error here.
+// libjpeg only warns of damaged data and fills the rest with grey; here an incomplete image is an error.
 void OnMessage(j_common_ptr info, int level) {
   if (level >= 0) return;  // traces
   const int code = info->err->msg_code;
-  if (code == JWRN_EXTRANEOUS_DATA || code == JWRN_ADOBE_XFORM) return;  // bytes between markers: pixels are all there
+  if (code == JWRN_EXTRANEOUS_DATA || code == JWRN_ADOBE_XFORM) return;  // bytes between markers: all pixels are intact
   Fail(info);
 }
 
@@ -71,7 +71,7 @@ bool ReadHeader(JpegReader& reader, std::FILE* file, bool keep_exif = false) {
   return true;
 }
 
-// Without inks' profile. Adobe's programs store how much of an ink is left out.
+// CMYK without a profile. Adobe's programs store inverted ink values.
 void StoreCmyk(const JSAMPLE* row, int64_t y, bool inverted, Image& image) {
   for (int c = 0; c < 3; ++c) {
     float* out = image.channel(c) + y * image.width;
@@ -125,7 +125,7 @@ Status CheckHeader(const JpegReader& reader, const std::string& name, uint64_t b
     return Error{ErrorCode::kBadFile, Cat(name, ": ", info.image_width, " x ", info.image_height, ", more than ",
                                           WithThousands(kMaxImagePixels), " pixels")};
   }
-  // With Huffman codes a block of 64 pixels takes a bit at the very least; arithmetic coding has no such bound.
+  // With Huffman codes, a block of 64 pixels takes at least one bit; arithmetic coding has no such bound.
   if (!info.arith_code && static_cast<uint64_t>(pixels) / 1024 > bytes) {
     return Error{ErrorCode::kBadFile, Cat(name, ": a JPEG of ", info.image_width, " x ", info.image_height,
                                           " cannot have only ", WithThousands(static_cast<int64_t>(bytes)), " bytes")};
@@ -162,7 +162,7 @@ Result<Image> DecodeJpeg(std::FILE* file, const std::string& name, uint64_t byte
 }
 
 Result<Image> DecodeJpegBytes(std::string_view bytes, const std::string& name) {
-  // Only read from, whatever its signature says.
+  // Only read from, despite its signature.
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(fmemopen(const_cast<char*>(bytes.data()), bytes.size(), "rb"),
                                                        std::fclose);
   if (file == nullptr) return Error{ErrorCode::kIo, Cat(name, ": cannot be read from memory")};

@@ -6,7 +6,7 @@ namespace anchorsplat {
 
 namespace {
 
-// For each pixel of the upright picture, in order, the one of the stored picture (width × height) that it is.
+// For each pixel of the upright image, in order, the index in the stored image (width × height).
 template <typename Take>
 void ForUpright(int width, int height, int orientation, const Take& take) {
   const bool swaps = SwapsSides(orientation);
@@ -15,8 +15,8 @@ void ForUpright(int width, int height, int orientation, const Take& take) {
   for (int y = 0; y < out_height; ++y) {
     for (int x = 0; x < out_width; ++x, ++to) {
       int column = swaps ? y : x, row = swaps ? x : y;
-      // What lies at the stored picture's first row and column: 1 top left, 2 top right, 3 bottom right, 4 bottom left,
-      // and the same after the sides are swapped: 5 left top, 6 right top, 7 right bottom, 8 left bottom.
+      // Position of the stored first row and column: 1 top left, 2 top right, 3 bottom right, 4 bottom left; with
+      // swapped sides: 5 left top, 6 right top, 7 right bottom, 8 left bottom.
       if (orientation == 2 || orientation == 3 || orientation == 7 || orientation == 8) column = width - 1 - column;
       if (orientation == 3 || orientation == 4 || orientation == 6 || orientation == 7) row = height - 1 - row;
       take(to, int64_t{row} * width + column);
@@ -30,7 +30,7 @@ int OrientationOfExif(std::string_view tiff) {
   if (tiff.size() < 8) return 1;
   const bool little = tiff.substr(0, 2) == "II";
   if (!little && tiff.substr(0, 2) != "MM") return 1;
-  const auto number = [&](size_t at, size_t bytes) {  // within the block, as its callers see to
+  const auto number = [&](size_t at, size_t bytes) {  // within the block, as the callers ensure
     uint64_t value = 0;
     for (size_t i = 0; i < bytes; ++i) {
       value |= uint64_t{static_cast<unsigned char>(tiff[at + i])} << (8 * (little ? i : bytes - 1 - i));

@@ -8,16 +8,16 @@
 
 namespace anchorsplat {
 
-// EXIF's orientation, 1 to 8, in a TIFF block as it stands in a JPEG's APP1 behind "Exif\0\0" and in a PNG's eXIf
-// (EXIF 2.32, tag 0x0112 of the first directory). 1, as it is, for whatever is damaged or says nothing.
+// EXIF orientation, 1 to 8, from a TIFF block as in a JPEG's APP1 after "Exif\0\0" and in a PNG's eXIf (EXIF 2.32, tag
+// 0x0112 of the first directory). 1 if absent or damaged.
 int OrientationOfExif(std::string_view tiff);
 
-// Whether rows and columns change places.
+// Whether width and height are swapped.
 inline bool SwapsSides(int orientation) { return orientation >= 5 && orientation <= 8; }
 
-// The picture as it is meant to be seen. Orientations out of 1 to 8 are 1.
+// Applies the orientation. Values outside 1 to 8 count as 1.
 Image Upright(Image image, int orientation);
-// Of something else with a value per pixel, [height,width] as stored.
+// The same for one value per pixel, [height,width] as stored.
 Buffer<uint8_t> Upright(const Buffer<uint8_t>& values, int width, int height, int orientation);
 
 }  // namespace anchorsplat

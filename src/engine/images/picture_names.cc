@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "core/small_letters.h"
+#include "core/ascii_lower_case.h"
 
 namespace anchorsplat {
 
@@ -14,7 +14,7 @@ constexpr const char* kOthers[] = {".heic", ".heif", ".avif", ".bmp", ".gif", ".
                                    ".hdr",  ".jxl",  ".jp2",  ".ppm", ".pgm", ".dng"};
 
 bool IsOneOf(const std::filesystem::path& path, const auto& extensions) {
-  const std::string extension = SmallLetters(path.extension().string());
+  const std::string extension = AsciiLowerCase(path.extension().string());
   return std::find(std::begin(extensions), std::end(extensions), extension) != std::end(extensions);
 }
 

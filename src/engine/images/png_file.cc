@@ -16,8 +16,8 @@ namespace anchorsplat {
 
 namespace {
 
-// libpng reports errors by jumping over the frames in between, so nothing that needs a destructor may be created after
-// setjmp: everything lives in one of the two structs below, which the caller owns.
+// libpng reports errors by longjmp, so no object with a destructor may be created after setjmp: everything lives in one
+// of the two structs below, owned by the caller.
 struct PngErrors {
   std::jmp_buf jump;
   char message[160] = "";
@@ -29,7 +29,7 @@ struct PngErrors {
   std::longjmp(errors->jump, 1);
 }
 
-void OnWarning(png_structp, png_const_charp) {}  // about text, profiles and other chunks that we do not use
+void OnWarning(png_structp, png_const_charp) {}  // about unused chunks such as text and profiles
 
 struct PngReader {
   std::FILE* file = nullptr;
@@ -52,8 +52,7 @@ void ReadBytes(png_structp png, png_bytep to, size_t count) {
   }
 }
 
-// False after an error, which is then in reader.errors. Leaves the transformed layout set up: rgb or rgba, 8 or 16
-// bits.
+// False on error, stored in reader.errors. Sets up the output layout: rgb or rgba, 8 or 16 bits.
 bool ReadHeader(PngReader& reader) {
   reader.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &reader.errors, OnError, OnWarning);
   if (reader.png == nullptr) return false;
@@ -104,7 +103,7 @@ bool ReadPixels(PngReader& reader, size_t stride, int passes, bool wide) {
       }
     }
   }
-  png_read_end(reader.png, nullptr);  // a file cut off behind its pixels is cut off all the same
+  png_read_end(reader.png, nullptr);  // detects truncation after the pixels
   return true;
 }
 
@@ -124,7 +123,7 @@ Status CheckSize(const PngReader& reader, const std::string& name) {
     return Error{ErrorCode::kBadFile,
                  Cat(name, ": ", width, " x ", height, ", more than ", WithThousands(kMaxImagePixels), " pixels")};
   }
-  // Deflate packs at most 1032 bytes into one: a file that promises more has not got it.
+  // Deflate compresses by at most 1032: a file that claims more is truncated.
   const uint64_t packed = png_get_rowbytes(reader.png, reader.info) * static_cast<uint64_t>(height);
   if (packed / 1032 > reader.file_bytes) {
     return Error{ErrorCode::kBadFile, Cat(name, ": a PNG of ", width, " x ", height, " cannot have only ",
@@ -149,25 +148,25 @@ void AppendBytes(png_structp png, png_bytep from, size_t count) {
     writer->bytes.append(reinterpret_cast<const char*>(from), count);
     return;
   } catch (const std::bad_alloc&) {
-    // Nothing here: the jump below must not leave an unfinished handler behind.
+    // Nothing here: the longjmp below must not leave a handler unfinished.
   }
   png_error(png, "out of memory");
 }
 
 void IgnoreFlush(png_structp) {}
 
-// NaN becomes 0: every comparison with it is false.
+// NaN becomes 0, as all comparisons with it are false.
 png_byte Quantized(float value) {
   return value > 0 ? (value < 1 ? static_cast<png_byte>(value * 255.0f + 0.5f) : png_byte{255}) : png_byte{0};
 }
 
-// The PNG chunk with the name of the program that made a picture, and ours for what it rendered.
+// Text chunk with the name of the program, and our value for renderings.
 constexpr std::string_view kProgram = "Software", kRendering = "anchorsplat render", kComment = "Comment";
 
 png_text Text(std::string_view key, std::string_view value) {
   png_text text{};
   text.compression = PNG_TEXT_COMPRESSION_NONE;
-  text.key = const_cast<png_charp>(key.data());  // which libpng does not write to
+  text.key = const_cast<png_charp>(key.data());  // libpng does not write to it
   text.text = const_cast<png_charp>(value.data());
   text.text_length = value.size();
   return text;
@@ -194,7 +193,7 @@ bool WritePixels(PngWriter& writer, const Image& image, bool rendering, const st
     const png_text text = Text(kComment, comment);
     png_set_text(writer.png, writer.info, &text, 1);
   }
-  // A third of the default's time, for renders that are 6 to 19 % larger.
+  // A third of the default's time; renderings are 6 to 19 % larger.
   png_set_compression_level(writer.png, 3);
   png_set_filter(writer.png, PNG_FILTER_TYPE_BASE, PNG_FILTER_UP);
   png_write_info(writer.png, writer.info);
@@ -277,7 +276,7 @@ Result<std::string> EncodePng(const Image& image, bool rendering, const std::str
 
 bool IsMarkedAsRendering(std::string_view head) {
   const std::string mark = Cat("tEXt", kProgram, '\0', kRendering);
-  // Before the pixels, which may hold any bytes.
+  // Search before the pixels, which may contain any bytes.
   return head.starts_with("\x89PNG") && head.substr(0, head.find("IDAT")).find(mark) != std::string_view::npos;
 }
 

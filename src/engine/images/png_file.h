@@ -11,15 +11,15 @@
 
 namespace anchorsplat {
 
-// The PNG side of image_io.h. `file` stands at its first byte; `name` is for messages, `bytes` the file's length.
+// PNG for image_io.h. `file`: at its first byte; `name`: for messages; `bytes`: length of the file.
 Result<Image> DecodePng(std::FILE* file, const std::string& name, uint64_t bytes);
 Result<ImageSize> DecodePngSize(std::FILE* file, const std::string& name, uint64_t bytes);
 
-// 8-bit PNG of an image with 1, 3 or 4 channels; marked as a `rendering` where it is one, with a `comment` in ASCII
-// where there is one.
+// Encodes an 8-bit PNG with 1, 3 or 4 channels. `rendering` marks it as one (images/rendering.h); a non-empty `comment`
+// is ASCII.
 Result<std::string> EncodePng(const Image& image, bool rendering = false, const std::string& comment = {});
 
-// Whether the first bytes of a file are those of a PNG that EncodePng marked as a rendering.
+// Whether the first bytes of a file are from a PNG that EncodePng marked as a rendering.
 bool IsMarkedAsRendering(std::string_view head);
 
 }  // namespace anchorsplat

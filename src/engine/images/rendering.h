@@ -9,12 +9,11 @@
 
 namespace anchorsplat {
 
-// WritePng (images/image_io.h) of what was rendered, which the file says (its text "Software").
+// WritePng (images/image_io.h) with a mark that the image was rendered (text "Software").
 Status WriteRendering(const std::filesystem::path& path, const Image& image, const WriteOptions& options = {},
                       const std::string& comment = {});
 
-// Whether a file is such a rendering, which is looked for in its first bytes. That alone does not make it an input
-// (io/input_record.h).
+// Whether a file begins with that mark. Checking does not make it an input (io/input_record.h).
 bool IsOwnRendering(const std::filesystem::path& path);
 
 }  // namespace anchorsplat

@@ -8,8 +8,8 @@
 
 namespace anchorsplat {
 
-// The TIFF side of image_io.h: 8 and 16 bits, grey and rgb, with alpha or without, in strips or tiles, by libtiff. A
-// build for the web has without_tiff/ in the place of with_tiff/. `name` is for messages, `bytes` the file. kBadFile.
+// TIFF for image_io.h by libtiff: 8 and 16 bits, grey or rgb, with or without alpha, strips or tiles. The web build
+// uses without_tiff/ instead. `name`: for messages; `bytes`: the file. Errors: kBadFile.
 Result<Image> DecodeTiff(const std::string& name, std::string bytes);
 Result<ImageSize> DecodeTiffSize(const std::string& name, std::string bytes);
 

@@ -10,7 +10,7 @@ namespace anchorsplat {
 
 namespace {
 
-// Of 0–100 and 0–6: more makes such pictures hardly smaller, but takes many times as long.
+// Of 0–100 and 0–6; higher values hardly reduce such images but take many times as long.
 constexpr float kEffort = 20;
 constexpr int kMethod = 1;
 
@@ -26,7 +26,7 @@ Result<WebPBitstreamFeatures> FeaturesOf(const std::string& where, std::string_v
   return features;
 }
 
-// Of the chunk "EXIF" of the file, which some programs begin as a JPEG's.
+// EXIF orientation from the chunk "EXIF", to which some programs add JPEG's prefix.
 int OrientationOf(std::string_view bytes) {
   constexpr size_t kHead = 12, kChunkHead = 8;  // "RIFF", length, "WEBP"; name, length
   for (size_t at = kHead; at + kChunkHead <= bytes.size();) {

@@ -66,7 +66,8 @@ TEST(WebpPhotograph, ComesAsThePictureItIs) {
   for (size_t n = 0; n < bytes.size(); ++n) {
     const auto cut = DecodeWebpPhotograph("cut", bytes.substr(0, n));
     EXPECT_TRUE(cut.ok() || cut.error().code == ErrorCode::kBadFile) << n;
-    (void)DecodeWebpSize("cut", bytes.substr(0, n));
+    const auto cut_size = DecodeWebpSize("cut", bytes.substr(0, n));
+    EXPECT_TRUE(cut_size.ok() ? cut_size->width == 3 : cut_size.error().code == ErrorCode::kBadFile) << n;
   }
 }
 

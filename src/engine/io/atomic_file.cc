@@ -37,8 +37,8 @@ std::string TemporaryName() {
   return Cat(".anchorsplat-", ::getpid(), "-", counter.fetch_add(1), ".partial");
 }
 
-// A file without a name, which the system removes by itself however the process ends; −1 where the file system or the
-// absence of /proc, through which it will be named, does not allow it.
+// Opens an unnamed file, which vanishes however the process ends. −1 if the file system does not support it, or without
+// /proc, which is needed to name it.
 int OpenNameless([[maybe_unused]] const fs::path& folder) {
 #ifdef O_TMPFILE
   if (::access("/proc/self/fd", X_OK) == 0) return ::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666);
@@ -46,13 +46,13 @@ int OpenNameless([[maybe_unused]] const fs::path& folder) {
   return -1;
 }
 
-// Gives a nameless file its first name; refuses to replace. An errno.
+// Links an O_TMPFILE file to `name` without replacing; returns 0 or errno.
 int NameTheNameless(int descriptor, const fs::path& name) {
   const std::string link = Cat("/proc/self/fd/", descriptor);
   return ::linkat(AT_FDCWD, link.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0 ? 0 : errno;
 }
 
-// rename() that refuses to replace. The flag is not known to every file system; there, look and rename.
+// rename() without replacing. Falls back to a check and rename() on file systems that lack the flag.
 int RenameToNewName(const char* from, const char* to) {
 #ifdef RENAME_NOREPLACE
   if (::renameat2(AT_FDCWD, from, AT_FDCWD, to, RENAME_NOREPLACE) == 0) return 0;
@@ -63,7 +63,7 @@ int RenameToNewName(const char* from, const char* to) {
   return ::rename(from, to) == 0 ? 0 : errno;
 }
 
-// Renames over `to` and keeps the file that was there as `old`. The name always stands for one of the two.
+// Renames over `to` and keeps the previous file as `old`. At any time the name refers to one of the two.
 int RenameKeepingOld(const fs::path& from, const fs::path& to, fs::path& old) {
 #ifdef RENAME_EXCHANGE
   if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_EXCHANGE) == 0) {
@@ -77,7 +77,7 @@ int RenameKeepingOld(const fs::path& from, const fs::path& to, fs::path& old) {
     kept = to.parent_path() / TemporaryName();
   } while (::link(to.c_str(), kept.c_str()) != 0 && errno == EEXIST);
   struct stat info {};
-  if (::lstat(kept.c_str(), &info) != 0 && ::rename(to.c_str(), kept.c_str()) != 0) return errno;  // it has no links
+  if (::lstat(kept.c_str(), &info) != 0 && ::rename(to.c_str(), kept.c_str()) != 0) return errno;  // no hard links here
   if (::rename(from.c_str(), to.c_str()) == 0) {
     old = kept;
     return 0;
@@ -91,13 +91,13 @@ int RenameKeepingOld(const fs::path& from, const fs::path& to, fs::path& old) {
   return error;
 }
 
-// What a name stands for where its last part is a symbolic link, also one to a file that is not there yet. An errno.
+// Resolves symbolic links in the last path component, including dangling ones; returns 0 or errno.
 int FollowLinks(fs::path& path) {
-  constexpr int kMostLinks = 40;  // as the system has it
+  constexpr int kMostLinks = 40;  // the system's limit
   for (int links = 0; links < kMostLinks; ++links) {
     std::error_code code;
     const fs::path named = fs::read_symlink(path, code);
-    if (code) return code.value() == EINVAL || code.value() == ENOENT ? 0 : code.value();  // no link, or no file
+    if (code) return code.value() == EINVAL || code.value() == ENOENT ? 0 : code.value();  // not a link, or no file
     path = path.parent_path() / named;
   }
   return ELOOP;
@@ -123,18 +123,18 @@ Result<OutputFile> OutputFile::Create(const fs::path& path, bool overwrite, Outp
                  "-: this is not written to standard output; give it a name (./- is a file called so)"};
   }
 
-  mode_t mode = 0666;  // less the umask, like any new file
+  mode_t mode = 0666;  // minus the umask, like any new file
   struct stat info {};
   const bool exists = ::stat(path.c_str(), &info) == 0;
   if (exists) {
     if (S_ISDIR(info.st_mode)) return Error{ErrorCode::kIo, Cat(path.string(), ": is a folder, not a file to write")};
-    ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(path));
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckNotInput(path));
     if (!overwrite && !IsOwnFile(path)) return AlreadyThere(path);
     if (!S_ISREG(info.st_mode)) {
       return Error{ErrorCode::kIo, Cat(path.string(), ": is not a regular file and cannot be replaced by one")};
     }
     mode = info.st_mode & 0777;
-  } else if (errno != ENOENT && errno != ENOTDIR) {  // a name too long, a link to itself: known now, not after the work
+  } else if (errno != ENOENT && errno != ENOTDIR) {  // overlong name or link cycle: report before the work
     return WriteError(path, "create a file of this name", errno);
   }
   if (const int error = FollowLinks(file.target_); error != 0 && error != ENOTDIR) {
@@ -144,7 +144,7 @@ Result<OutputFile> OutputFile::Create(const fs::path& path, bool overwrite, Outp
   fs::path folder = file.target_.parent_path();
   if (folder.empty()) folder = ".";
   file.descriptor_ = OpenNameless(folder);
-  while (file.descriptor_ < 0) {  // a name left over by a killed process with our number is skipped
+  while (file.descriptor_ < 0) {  // skip names left by a killed process with our pid
     file.temporary_ = folder / TemporaryName();
     file.descriptor_ = ::open(file.temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (file.descriptor_ < 0 && errno != EEXIST && errno != EINTR) break;
@@ -158,7 +158,7 @@ Result<OutputFile> OutputFile::Create(const fs::path& path, bool overwrite, Outp
     }
     return WriteError(path, "create a file in its folder", error);
   }
-  if (exists) (void)::fchmod(file.descriptor_, mode);  // the replaced file's permissions, where we may set them
+  if (exists) (void)::fchmod(file.descriptor_, mode);  // keep the replaced file's permissions, if allowed
   return file;
 }
 
@@ -193,7 +193,7 @@ Status OutputFile::Reserve(uint64_t bytes) {
     bytes_->Reserve(bytes);
     return {};
   }
-#if defined(FALLOC_FL_KEEP_SIZE) && !defined(__EMSCRIPTEN__)  // which names it and has none
+#if defined(FALLOC_FL_KEEP_SIZE) && !defined(__EMSCRIPTEN__)  // it declares the flag but lacks the call
   if (::fallocate(descriptor_, FALLOC_FL_KEEP_SIZE, 0, static_cast<off_t>(bytes)) != 0 && errno == ENOSPC) {
     return Error{ErrorCode::kIo,
                  Cat(path_.string(), ": cannot write ", HumanBytes(bytes), ": no space left on the device")};
@@ -227,16 +227,16 @@ Status OutputFile::WriteAt(uint64_t offset, const void* data, size_t size) const
   return {};
 }
 
-// No bytes follow. Files that may replace one get a name to be renamed from.
+// Finishes writing. A file that may replace another gets a temporary name to be renamed from.
 Status OutputFile::FinishBytes() {
   if (memory_ != nullptr) return {};
   const bool replaces = overwrite_ || IsOwnFile(target_);
-  if (temporary_.empty() && !replaces) return {};  // nameless, and stays so until it is given its name at once
+  if (temporary_.empty() && !replaces) return {};  // stays unnamed until it gets its final name
   while (temporary_.empty()) {
     fs::path name = target_.parent_path() / TemporaryName();
     const int error = NameTheNameless(descriptor_, name);
     if (error == 0) temporary_ = std::move(name);
-    // A name left over by a killed process with our number, or of one with our number in another container.
+    // Left by a killed process with our pid, or by one with our pid in another container.
     if (error != 0 && error != EEXIST) return WriteError(path_, "give the file its name", error);
   }
   RecordWritten(descriptor_);
@@ -251,13 +251,13 @@ Status OutputFile::TakeName(bool keep_old) {
     memory_->files.insert_or_assign(path_, bytes_->Take());
     return {};
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(target_));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckNotInput(target_));
   int error = 0;
   if (temporary_.empty()) {
     error = NameTheNameless(descriptor_, target_);
     if (error == 0) {
       RecordWritten(descriptor_);
-      ::close(std::exchange(descriptor_, -1));  // only local file systems have nameless files
+      ::close(std::exchange(descriptor_, -1));  // only local file systems support unnamed files
       return {};
     }
   } else if (struct stat info{}; overwrite_ || IsOwnFile(target_)) {
@@ -278,7 +278,7 @@ Status OutputFile::TakeName(bool keep_old) {
   return {};
 }
 
-Status OutputFile::GiveNameBack() {
+Status OutputFile::RestoreOldFile() {
   if (memory_ != nullptr) {
     memory_->files.erase(path_);
     return {};
@@ -295,14 +295,14 @@ Status CommitTogether(std::span<OutputFile> files) {
   Status status;
   size_t named = 0;
   for (size_t k = 0; k < files.size() && status.ok(); ++k) status = files[k].FinishBytes();
-  if (status.ok()) LeaveIfAbandoned();  // that took a while, and nobody has seen a name yet
+  if (status.ok()) LeaveIfAbandoned();  // it took a while, and no name is visible yet
   while (named < files.size() && status.ok()) {
     status = files[named].TakeName(/*keep_old=*/files.size() > 1);
     if (status.ok()) ++named;
   }
   if (!status.ok()) {
     for (size_t k = named; k > 0; --k) {
-      const Status back = files[k - 1].GiveNameBack();
+      const Status back = files[k - 1].RestoreOldFile();
       if (!back.ok()) status = Error{status.error().code, Cat(status.error().message, "; ", back.error().message)};
     }
   }
@@ -319,13 +319,13 @@ Status CheckWritable(const fs::path& path, bool overwrite) {
   return file.ok() ? Status() : Status(file.error());
 }
 
-Status WriteOrKeep(const fs::path& path, bool overwrite,
-                   const std::function<Status(const fs::path& name, bool overwrite)>& write) {
+Status WriteOrSaveBeside(const fs::path& path, bool overwrite,
+                         const std::function<Status(const fs::path& name, bool overwrite)>& write) {
   const Status status = write(path, overwrite);
   if (status.ok() || (status.error().code != ErrorCode::kExists && status.error().code != ErrorCode::kBadArgument)) {
     return status;
   }
-  // "scan-2.ply", also of "scan.compressed.ply"; a SOG of pictures is its folder, where all names are given.
+  // "scan-2.ply", also for "scan.compressed.ply". An unpacked SOG is named by its folder, in which all names are fixed.
   const bool folder = path.filename() == "meta.json";
   const fs::path named = folder ? path.parent_path() : path;
   const std::string name = named.filename().string();

@@ -13,23 +13,23 @@
 
 namespace anchorsplat {
 
-// A file that appears under its name whole or not at all: bytes go to a file without a name in the same folder,
-// Commit() names it. Without Commit() nothing is left, however the process ends. Where the system has no nameless files
-// (O_TMPFILE), a hidden ".anchorsplat-*.partial" stands in, which only a kill leaves behind. Nothing is fsynced: this
-// protects against crashes of the program, not of the machine, and costs no disk flush.
+// An output file that appears under its name complete or not at all. Bytes go to an unnamed file (O_TMPFILE) in the
+// same folder; Commit() names it. Without Commit() nothing is left, however the process ends. On systems without
+// O_TMPFILE a hidden ".anchorsplat-*.partial" is used instead, which only a kill leaves behind. Nothing is fsynced:
+// this protects against crashes of the program, not of the machine.
 //
-// Through a symbolic link the file that it names is written; the link stays. Nothing that the command has read is ever
-// replaced, and its own state always is (input_record.h).
+// A symbolic link stays, and its target is written. Files that the command has read are never replaced; its own state
+// may always be (input_record.h).
 //
 //   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
 //   ANCHORSPLAT_RETURN_IF_ERROR(file.Write(bytes));
 //   return file.Commit();
 class OutputFile {
  public:
-  // Errors: kBadArgument when `path` is an input; kExists when it exists and `overwrite` is false; kNotFound when its
-  // folder does not; kIo when the system refuses or `path` is something that cannot be replaced by a file.
-  // With `memory` the file goes there under the name `path` and nothing of the file system is looked at: then only an
-  // empty name is an error. Running out of memory throws std::bad_alloc.
+  // Errors: kBadArgument: `path` is an input. kExists: it exists and `overwrite` is false. kNotFound: its folder does
+  // not exist. kIo: a system error, or `path` cannot be replaced by a file.
+  // With `memory`, the file is stored there under the name `path` and the file system is not touched; only an empty
+  // name is an error. Running out of memory throws std::bad_alloc.
   static Result<OutputFile> Create(const std::filesystem::path& path, bool overwrite, OutputMemory* memory = nullptr);
 
   OutputFile(OutputFile&& other) noexcept;
@@ -38,17 +38,17 @@ class OutputFile {
 
   const std::filesystem::path& path() const { return path_; }
 
-  // Claims disk space, so that a full disk is an error now and not at the last byte. The final size is still decided by
-  // what is written; file systems that cannot reserve are no error.
+  // Reserves disk space, so that a full disk fails now and not at the last byte. The final size is still what is
+  // written. Not an error on file systems that cannot reserve.
   Status Reserve(uint64_t bytes);
-  // Appends to what Write() wrote before.
+  // Appends after previous Write() calls.
   Status Write(const void* data, size_t size);
   Status Write(std::string_view bytes) { return Write(bytes.data(), bytes.size()); }
-  // Writes at a byte offset of its own; may be called from several threads for disjoint ranges.
+  // Writes at a byte offset. Thread-safe for disjoint ranges.
   Status WriteAt(uint64_t offset, const void* data, size_t size) const;
 
-  // Gives the file its name. A file that came into being under that name since Create() is kExists unless `overwrite`,
-  // one that was read since then is kBadArgument.
+  // Gives the file its name. Errors: kExists: a file appeared there since Create() and `overwrite` is false.
+  // kBadArgument: the command has read that file since.
   Status Commit();
 
  private:
@@ -58,34 +58,32 @@ class OutputFile {
   void Discard() noexcept;
   Status FinishBytes();
   Status TakeName(bool keep_old);
-  Status GiveNameBack();
+  Status RestoreOldFile();
 
-  std::filesystem::path path_;    // as the caller said it: for messages
-  std::filesystem::path target_;  // what is renamed over: `path_` with a symbolic link followed
+  std::filesystem::path path_;    // as given by the caller, for messages
+  std::filesystem::path target_;  // file to replace: `path_` with symbolic links followed
   std::filesystem::path temporary_;
-  std::filesystem::path old_;  // where the file that had the name is kept until the others have theirs
+  std::filesystem::path old_;  // backup of the replaced file until all of CommitTogether succeed
   int descriptor_ = -1;
-  OutputMemory* memory_ = nullptr;  // where it goes instead
+  OutputMemory* memory_ = nullptr;  // destination instead of a file, or null
   std::unique_ptr<MemoryBytes> bytes_;
   bool overwrite_ = false;
   uint64_t written_ = 0;
 };
 
-// Whether a file can come into being under that name, by trying: for knowing it before hours of work. Errors: those of
-// OutputFile::Create.
+// Checks by trying whether a file can be created at `path`, before hours of work. Errors: those of OutputFile::Create.
 Status CheckWritable(const std::filesystem::path& path, bool overwrite = true);
 
-// `write` under this name. Where that is refused for the file that has the name now (kExists, kBadArgument), which
-// CheckWritable did not see before the work, the result is written under the next free name beside it, "scan-2.ply";
-// the error names it.
-Status WriteOrKeep(const std::filesystem::path& path, bool overwrite,
-                   const std::function<Status(const std::filesystem::path& name, bool overwrite)>& write);
+// Calls `write` with `path`. If the name has been taken since CheckWritable (kExists, kBadArgument), calls it again
+// with the next free name beside it, "scan-2.ply", and returns an error that names that file.
+Status WriteOrSaveBeside(const std::filesystem::path& path, bool overwrite,
+                         const std::function<Status(const std::filesystem::path& name, bool overwrite)>& write);
 
-// Commits files that belong together, in their order: the last one is the one that names the others. All or none: where
-// one of them cannot have its name, those before it give theirs back to the files that had them.
+// Commits related files in order; the last one should be the one that refers to the others. All or none: on failure,
+// the files replaced so far are restored.
 Status CommitTogether(std::span<OutputFile> files);
 
-// The whole of `bytes` as a file: Create, Write, Commit.
+// Writes `bytes` as a file: Create, Write, Commit.
 Status WriteWholeFile(const std::filesystem::path& path, std::string_view bytes, bool overwrite);
 
 }  // namespace anchorsplat

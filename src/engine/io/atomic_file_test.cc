@@ -288,13 +288,13 @@ TEST(AtomicFile, KeepsAResultWhoseNameWasTaken) {
   const auto write = [](const fs::path& path, bool overwrite) { return WriteWholeFile(path, "mine", overwrite); };
   std::ofstream(folder / "scan.compressed.ply") << "theirs";
   std::ofstream(folder / "scan-2.compressed.ply") << "theirs";
-  const Status status = WriteOrKeep(folder / "scan.compressed.ply", false, write);
+  const Status status = WriteOrSaveBeside(folder / "scan.compressed.ply", false, write);
   ASSERT_FALSE(status.ok());
   EXPECT_EQ(status.error().code, ErrorCode::kExists);
   EXPECT_NE(status.error().message.find("scan-3.compressed.ply"), std::string::npos) << status.error().message;
   EXPECT_EQ(FileBytes(folder / "scan.compressed.ply"), "theirs");
   EXPECT_EQ(FileBytes(folder / "scan-3.compressed.ply"), "mine");
-  ASSERT_TRUE(WriteOrKeep(folder / "scan.compressed.ply", true, write).ok());
+  ASSERT_TRUE(WriteOrSaveBeside(folder / "scan.compressed.ply", true, write).ok());
   EXPECT_EQ(FileBytes(folder / "scan.compressed.ply"), "mine");
   EXPECT_EQ(folder.Entries(), 3);
 }

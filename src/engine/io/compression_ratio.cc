@@ -4,9 +4,9 @@
 
 namespace anchorsplat {
 
-Status CheckRatio(const std::string& where, uint64_t compressed, uint64_t raw) {
+Status CheckCompressionRatio(const std::string& where, uint64_t compressed, uint64_t raw) {
   constexpr uint64_t kMaxRatio = 200;
-  constexpr uint64_t kAlwaysFine = uint64_t{64} << 20;  // bytes: harmless, and parts of real clouds may be constant
+  constexpr uint64_t kAlwaysFine = uint64_t{64} << 20;  // bytes: harmless, and parts of real splats may be constant
   if (raw <= kAlwaysFine || raw / kMaxRatio <= compressed) return {};
   return Error{ErrorCode::kBadFile, Cat(where, ": promises ", HumanBytes(raw), " in ", HumanBytes(compressed),
                                         " of compressed data; more than 200 times is taken for a decompression bomb")};

@@ -7,8 +7,8 @@
 
 namespace anchorsplat {
 
-// That compressed data of `compressed` bytes may become `raw` bytes. Real data shrink to a tenth; what promises two
-// hundred times its size would take memory that the file never paid for. kBadFile otherwise.
-Status CheckRatio(const std::string& where, uint64_t compressed, uint64_t raw);
+// Rejects decompression bombs: kBadFile if `raw` bytes from `compressed` bytes exceed a ratio of 200. Real data shrink
+// to about a tenth.
+Status CheckCompressionRatio(const std::string& where, uint64_t compressed, uint64_t raw);
 
 }  // namespace anchorsplat

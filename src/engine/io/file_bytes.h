@@ -15,17 +15,17 @@ struct FileCloser {
 };
 using FileHandle = std::unique_ptr<std::FILE, FileCloser>;
 
-// A regular file opened for reading, and how long it was when it was opened.
+// A regular file opened for reading, with its size at that time in bytes.
 struct OpenedFile {
   FileHandle handle;
   uint64_t size = 0;
 };
 
-// Folders, pipes and devices are refused: their length is unknown, and every bound we check rests on it.
-// Errors: kNotFound, kIo.
+// Opens a regular file. Folders, pipes and devices are refused: all our bounds rest on a known size. Errors: kNotFound,
+// kIo.
 Result<OpenedFile> OpenForReading(const std::filesystem::path& path);
 
-// The whole file, or pipe. Errors of InputFile::Open; kBadFile when it is longer than `max_bytes`.
+// Reads a whole file or pipe. Errors: those of InputFile::Open; kBadFile: longer than `max_bytes`.
 Result<std::string> ReadFileBytes(const std::filesystem::path& path, uint64_t max_bytes);
 
 }  // namespace anchorsplat

@@ -8,7 +8,7 @@
 
 namespace anchorsplat {
 
-// For tests: all that a file holds, read past what io/ records and checks. A file that is not there ends the test.
+// For tests: the contents of a file, bypassing the checks and records of io/. Throws if it cannot be opened.
 inline std::string FileBytes(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary);
   if (!in) throw std::runtime_error(path.string() + ": cannot be opened by a test");

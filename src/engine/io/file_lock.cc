@@ -33,7 +33,7 @@ Result<FileLock> FileLock::TakeAndRemove(const std::filesystem::path& path) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(FileLock lock, Take(path, false));
     struct stat held {
     }, named{};
-    // Whoever held it may have removed it after we opened it: then it is not the file of that name any more.
+    // The previous holder may have removed the file after we opened it; then the name refers to another one.
     if (::fstat(lock.descriptor_, &held) == 0 && ::stat(path.c_str(), &named) == 0 && held.st_ino == named.st_ino) {
       lock.remove_ = path;
       return lock;

@@ -6,13 +6,12 @@
 
 namespace anchorsplat {
 
-// A file that one process at a time may hold. The system lets go of it when the process ends, however it does, so that
-// nothing is left to clear away.
+// Lock file that one process can hold at a time. The system releases it however the process ends.
 class FileLock {
  public:
-  // kExists when another process holds it and `wait` is false; kIo.
+  // Errors: kExists: held by another process and `wait` is false; kIo.
   static Result<FileLock> Take(const std::filesystem::path& path, bool wait);
-  // The same, without waiting, of a file that is gone when the lock is let go: beside what people look at.
+  // The same without waiting; the file is removed with the lock, so that users do not see it beside their files.
   static Result<FileLock> TakeAndRemove(const std::filesystem::path& path);
   FileLock(FileLock&& other) noexcept;
   FileLock& operator=(FileLock&&) = delete;
@@ -21,7 +20,7 @@ class FileLock {
  private:
   FileLock() = default;
   int descriptor_ = -1;
-  std::filesystem::path remove_;  // at the end; empty: it stays
+  std::filesystem::path remove_;  // removed on release, unless empty
 };
 
 }  // namespace anchorsplat

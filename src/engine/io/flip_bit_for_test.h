@@ -7,8 +7,7 @@
 
 namespace anchorsplat {
 
-// For tests: damages a file in one bit of its byte `from_end` bytes before the end, as a bad disk does. Twice is not at
-// all.
+// For tests: flips one bit of the byte `from_end` bytes before the end, as a bad disk does. A second call restores it.
 inline void FlipBit(const std::filesystem::path& path, int from_end) {
   std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
   file.seekg(-from_end, std::ios::end);

@@ -9,7 +9,7 @@
 
 namespace anchorsplat {
 
-// For tests: a fresh folder that is removed with all it holds.
+// For tests: a temporary folder, removed with its contents on destruction.
 class TestFolder {
  public:
   TestFolder() {
@@ -26,7 +26,7 @@ class TestFolder {
 
   const std::filesystem::path& path() const { return path_; }
   std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
-  // Files and folders in it, hidden ones included.
+  // Number of files and folders in it, including hidden ones.
   int64_t Entries() const {
     return std::distance(std::filesystem::directory_iterator(path_), std::filesystem::directory_iterator());
   }

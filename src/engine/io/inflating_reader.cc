@@ -16,7 +16,7 @@ namespace {
 
 constexpr size_t kInput = size_t{128} << 10;
 
-// Hands out the file's bytes block by block.
+// Reads the file block by block.
 class Input {
  public:
   Input(const InputFile& file, uint64_t begin, uint64_t end)
@@ -37,14 +37,14 @@ class Input {
   }
   const uint8_t* block() const { return block_.get(); }
 
-  // Where the last `unused` bytes of the block have not been used: bytes behind, their first four as a number, fewer
-  // padded with zeros, and an error there.
-  uint64_t BytesBehind(size_t unused) const { return end_ - next_ + unused; }
+  // State after the last `unused` bytes of the block were not consumed: trailing bytes, the first four as a number
+  // (zero-padded), and an error at that position.
+  uint64_t TrailingBytes(size_t unused) const { return end_ - next_ + unused; }
   Result<uint32_t> Mark(size_t unused) const {
     uint8_t bytes[4] = {};
-    const auto size = static_cast<size_t>(std::min<uint64_t>(sizeof bytes, BytesBehind(unused)));
+    const auto size = static_cast<size_t>(std::min<uint64_t>(sizeof bytes, TrailingBytes(unused)));
     ANCHORSPLAT_RETURN_IF_ERROR(file_->ReadAt(next_ - unused, bytes, size));
-    return LoadLittle<uint32_t>(bytes);
+    return LoadLittleEndian<uint32_t>(bytes);
   }
   Error Bad(size_t unused, const std::string& what) const {
     return {ErrorCode::kBadFile,
@@ -55,7 +55,7 @@ class Input {
   const InputFile* file_;
   uint64_t next_, end_;
   std::unique_ptr<uint8_t[]> block_;
-  size_t filled_ = 0;  // bytes of the block
+  size_t filled_ = 0;  // bytes in the block
 };
 
 class GzipReader : public CopyableReader {
@@ -99,7 +99,7 @@ class GzipReader : public CopyableReader {
     return done;
   }
 
-  uint64_t BytesBehind() const override { return input_.BytesBehind(stream_.avail_in); }
+  uint64_t TrailingBytes() const override { return input_.TrailingBytes(stream_.avail_in); }
 
  private:
   Error Bad(std::string_view before, std::string_view after) const override {
@@ -126,7 +126,8 @@ class ZstdReader : public InflatingReader {
     while (to.pos < to.size) {
       if (!in_frame_) {
         ANCHORSPLAT_ASSIGN_OR_RETURN(const uint32_t next, input_.Mark(unused()));
-        // After the first frame, of which the library says what is wrong, what is no frame is not of the data.
+        // Trailing bytes after the first frame that do not start another frame are not part of the data. Errors in the
+        // first frame are reported by the library.
         const bool is_frame =
             next == ZSTD_MAGICNUMBER || (next & ZSTD_MAGIC_SKIPPABLE_MASK) == ZSTD_MAGIC_SKIPPABLE_START;
         if (!is_frame && any_frame_) break;
@@ -144,7 +145,7 @@ class ZstdReader : public InflatingReader {
     return to.pos;
   }
 
-  uint64_t BytesBehind() const override { return input_.BytesBehind(unused()); }
+  uint64_t TrailingBytes() const override { return input_.TrailingBytes(unused()); }
 
  private:
   size_t unused() const { return from_.size - from_.pos; }
@@ -171,7 +172,7 @@ class PlainReader : public CopyableReader {
     return some;
   }
 
-  uint64_t BytesBehind() const override { return file_->size() - next_; }
+  uint64_t TrailingBytes() const override { return file_->size() - next_; }
 
  private:
   Error Bad(std::string_view before, std::string_view after) const override {
@@ -194,7 +195,7 @@ Status InflatingReader::ExpectEnd() {
   uint8_t beyond = 0;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t read, ReadSome(&beyond, 1));
   if (read > 0) return Bad("", " goes on behind its data");
-  return BytesBehind() == 0 ? Status() : Status(Bad("there are bytes behind ", ""));
+  return TrailingBytes() == 0 ? Status() : Status(Bad("there are bytes behind ", ""));
 }
 
 std::unique_ptr<CopyableReader> OpenPlain(const InputFile& file, uint64_t begin) {

@@ -10,38 +10,36 @@
 
 namespace anchorsplat {
 
-// Decompresses a part of a file from front to back. Nothing is allocated for what the data promises: bytes come out as
-// they are asked for.
+// Decompresses part of a file sequentially. Allocates nothing based on sizes that the data claim.
 class InflatingReader {
  public:
   virtual ~InflatingReader() = default;
-  // The next `size` bytes, or fewer where the data ends; its checksum has been looked at then. kBadFile when it is
-  // damaged, or when the file ends before the data does (the message gives the byte).
+  // Reads the next `size` bytes. Returns fewer at the end of the data, whose checksum is then verified. kBadFile:
+  // damaged, or the file ends too early (the message gives the byte).
   virtual Result<size_t> ReadSome(void* out, size_t size) = 0;
-  // Bytes of the file behind the data, once it has ended.
-  virtual uint64_t BytesBehind() const = 0;
+  // Bytes of the file after the end of the data. Valid once the end has been reached.
+  virtual uint64_t TrailingBytes() const = 0;
 
-  // Exactly the next `size` bytes; kBadFile when the data ends before, too.
+  // Reads exactly `size` bytes; also kBadFile if the data end before.
   Status Read(void* out, size_t size);
-  // That nothing is left: neither data nor bytes of the file. kBadFile otherwise.
+  // kBadFile unless both the data and the file have ended.
   Status ExpectEnd();
 
  protected:
-  // "a.spz: byte 1,043: the gzip stream ends before its data does"; the byte is the next one.
+  // "a.spz: byte 1,043: the gzip stream ends before its data does"; the byte is the next to be read.
   virtual Error Bad(std::string_view before, std::string_view after) const = 0;
 };
 
-// One that another can go on from: what lies far into a stream can be read again without all before it.
+// Reader that can be cloned, to reread from the middle of a stream without decompressing everything before it.
 class CopyableReader : public InflatingReader {
  public:
-  // A reader of its own at the same place: 200 kB. The file must outlive it.
+  // A reader at the same position; costs 200 kB. The file must outlive it.
   virtual std::unique_ptr<CopyableReader> Copy() const = 0;
 };
 
-// The gzip stream from `begin` on, of any number of members, or the zstd frames in bytes [begin, end). The file must
-// outlive them.
+// Readers of `file`, which must outlive them: the gzip stream from byte `begin` on, with any number of members; the raw
+// bytes from `begin` on; and the zstd frames in bytes [begin, end).
 std::unique_ptr<CopyableReader> OpenGzip(const InputFile& file, uint64_t begin);
-// The bytes from `begin` on as they are, for what may be compressed or not.
 std::unique_ptr<CopyableReader> OpenPlain(const InputFile& file, uint64_t begin);
 std::unique_ptr<InflatingReader> OpenZstd(const InputFile& file, uint64_t begin, uint64_t end);
 

@@ -20,8 +20,8 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr uint64_t kMaxPipe = uint64_t{4} << 30;  // a pipe that never ends must not take all memory
-constexpr size_t kBlock = size_t{256} << 10;      // half of a usual L2 cache
+constexpr uint64_t kMaxPipe = uint64_t{4} << 30;  // an endless pipe must not take all memory
+constexpr size_t kBlock = size_t{256} << 10;      // half of a typical L2 cache
 constexpr int kLookMilliseconds = 50;
 
 std::string SystemReason(int error) { return std::generic_category().message(error); }
@@ -31,12 +31,12 @@ Error EndsBefore(const std::string& name, uint64_t end) {
           Cat(name, ": byte ", WithThousands(static_cast<int64_t>(end)), ": the file ends before its data does")};
 }
 
-// Waits for bytes, for the end, or for the run to be stopped: nobody may ever write.
+// Waits for data, the end, or a stop of the run: a pipe may never be written to.
 void AwaitPipe(int descriptor) {
   struct pollfd one = {.fd = descriptor, .events = POLLIN, .revents = 0};
   for (;;) {
     const int ready = ::poll(&one, 1, kLookMilliseconds);
-    if (ready > 0 || (ready < 0 && errno != EINTR)) return;  // read() says what is wrong
+    if (ready > 0 || (ready < 0 && errno != EINTR)) return;  // read() reports the error
     LeaveIfAbandoned();
   }
 }
@@ -65,7 +65,7 @@ Result<InputFile> InputFile::Open(const std::filesystem::path& path) {
   file.name_ = path.string();
   file.has_folder_ = true;
   const std::string& name = file.name_;
-  // Opening a pipe without a writer would wait for one without an end; its reading looks up meanwhile.
+  // O_NONBLOCK: opening a pipe without a writer would block forever; reading checks for a stop.
   do {
     file.descriptor_ = path == "-" ? ::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 0)
                                    : ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK);
@@ -193,7 +193,7 @@ Result<std::string> InputFile::ReadAll(uint64_t max_size) const {
   return Head(static_cast<size_t>(size_));
 }
 
-Result<std::string_view> InputFile::Whole(uint64_t max_size) const {
+Result<std::string_view> InputFile::Contents(uint64_t max_size) const {
   if (descriptor_ < 0 && size_ <= max_size) return memory_;
   const std::lock_guard lock(kept_->mutex);
   if (!kept_->bytes) {

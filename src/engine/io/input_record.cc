@@ -22,11 +22,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Which file it is, whatever it is called. The time of its birth tells it from a later one that got the number of an
-// inode that was removed; 0 where the system does not know it.
+// Identity of a file under any name. The birth time, 0 if unknown, distinguishes files that reuse an inode number.
 using Identity = std::tuple<uint64_t, uint64_t, int64_t>;
 
-// Of a regular file: what is open under `descriptor` where `path` is empty, else what has that name.
+// Identity of a regular file: of `descriptor` if `path` is empty, else of the file with that name.
 std::optional<Identity> IdentityOf(int descriptor, const char* path, bool follow) {
   const int flags = (*path == '\0' ? AT_EMPTY_PATH : 0) | (follow ? 0 : AT_SYMLINK_NOFOLLOW);
 #ifdef STATX_BTIME
@@ -50,8 +49,8 @@ std::optional<Identity> IdentityOf(const fs::path& path) {
 
 struct State {
   std::mutex mutex;
-  int records = 0;                         // open ones
-  std::map<Identity, std::string> inputs;  // and what they were called
+  int records = 0;                         // open records
+  std::map<Identity, std::string> inputs;  // and their names
   std::set<Identity> own, written;
 };
 
@@ -113,7 +112,7 @@ void RecordWritten(int descriptor) {
   if (state.records > 0 && identity) state.written.insert(*identity);
 }
 
-Status CheckIsNoInput(const fs::path& output) {
+Status CheckNotInput(const fs::path& output) {
   const std::optional<Identity> identity = IdentityOf(output);
   if (!identity) return {};
   const auto state_of_run = internal::CurrentStorage().Get<State>();
@@ -133,7 +132,7 @@ Status CheckHoldsNoInput(const fs::path& folder) {
   if (state.inputs.empty()) return {};
   std::error_code code;
   for (fs::recursive_directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
-    const auto identity = IdentityOf(AT_FDCWD, it->path().c_str(), false);  // a link in it does not hold its target
+    const auto identity = IdentityOf(AT_FDCWD, it->path().c_str(), false);  // a link inside does not contain its target
     const auto same = identity ? state.inputs.find(*identity) : state.inputs.end();
     if (same == state.inputs.end()) continue;
     return Error{ErrorCode::kBadArgument, Cat(folder.string(), ": holds the input ", same->second,

@@ -6,14 +6,13 @@
 
 namespace anchorsplat {
 
-// What a command reads is never what it writes: neither by another name, nor through a symbolic or a hard link, nor as
-// one of several files that it writes. While a record is open, whatever opens a file for reading puts it down here by
-// device and inode, and OutputFile looks here before it gives a file its name. Both do it by themselves; verbs only say
-// early what they will read later, and what is their own.
+// Protects inputs: a command never overwrites a file that it reads, not under another name, through a symbolic or hard
+// link, or as one of several outputs. While a record is open, opening a file for reading records its device and inode,
+// and OutputFile checks them before it names a file. Verbs only declare early what they will read later, and which
+// files are their own state.
 //
-// The program opens one record for its verb. Records within a record are part of it. Without one nothing is put down
-// and nothing refused. Every run has its own (core/run_context.h). All functions may be called from any thread that
-// takes part in it.
+// The program opens one record per verb; nested records join the outer one. Without a record nothing is recorded or
+// refused. Each run has its own (core/run_context.h). All functions are thread-safe within a run.
 class InputRecord {
  public:
   InputRecord();
@@ -22,22 +21,21 @@ class InputRecord {
   InputRecord& operator=(const InputRecord&) = delete;
 };
 
-// An input: what is open there, or what has that name (nothing, where there is no such file). "-" is standard input.
-// Files that the command wrote itself are none, and neither are its own ones.
+// Records an input: an open descriptor, or the file of that name, if it exists. "-" is standard input. Files that the
+// command wrote and its own files are ignored.
 void RecordInput(int descriptor, const std::filesystem::path& name);
 void RecordInput(const std::filesystem::path& path);
 
-// State that belongs to the command, left there by an earlier run of it: a checkpoint, a manifest, results to go on
-// from, what an interruption wrote. It may be read and replaced, also where nothing else may be overwritten. An input
-// does not become one.
+// Records a state file of the command from an earlier run: a checkpoint, a manifest, results to resume from, output of
+// an interrupted run. It can be read and replaced even where overwriting is not allowed. An input does not become one.
 void RecordOwnFile(const std::filesystem::path& path);
 bool IsOwnFile(const std::filesystem::path& path);
 
-// A file that the command has just written: reading it back does not make it an input.
+// Records an output, so that reading it back does not make it an input.
 void RecordWritten(int descriptor);
 
-// Errors (kBadArgument): there is an input under this name; a folder with an input in it, which is not to be removed.
-Status CheckIsNoInput(const std::filesystem::path& output);
+// kBadArgument: `output` is an input; `folder`, about to be removed, contains an input.
+Status CheckNotInput(const std::filesystem::path& output);
 Status CheckHoldsNoInput(const std::filesystem::path& folder);
 
 }  // namespace anchorsplat

@@ -60,14 +60,14 @@ TEST(InputRecord, ForgetsWhenTheOutermostEnds) {
   const TestFolder folder;
   Make(folder / "a");
   ASSERT_TRUE(ReadFileBytes(folder / "a", 100).ok());
-  EXPECT_TRUE(CheckIsNoInput(folder / "a").ok());  // none is open
+  EXPECT_TRUE(CheckNotInput(folder / "a").ok());  // none is open
   {
     const InputRecord outer;
     {
       const InputRecord inner;
       ASSERT_TRUE(ReadFileBytes(folder / "a", 100).ok());
     }
-    EXPECT_FALSE(CheckIsNoInput(folder / "a").ok());
+    EXPECT_FALSE(CheckNotInput(folder / "a").ok());
   }
   EXPECT_TRUE(WriteWholeFile(folder / "a", "new", true).ok());
 }

@@ -15,7 +15,7 @@ constexpr uint64_t kMaxBytes = uint64_t{256} << 20;
 constexpr size_t kMaxDepth = 64;
 constexpr size_t kMaxValues = size_t{1} << 24;
 
-// The library's sentence without its own tags. It quotes the text it stumbled over, which may be long.
+// The library's message without its tags and long quotes of the text.
 std::string SyntaxSentence(const std::string& what) {
   const size_t at = what.find("line ");
   std::string sentence = at == std::string::npos ? what : what.substr(at);
@@ -23,8 +23,8 @@ std::string SyntaxSentence(const std::string& what) {
   return sentence;
 }
 
-// Builds the document as the library reads it and stops at the bounds. The library has a parser with a callback for
-// that, but it looks through all elements of the array around every object that ends: a minute for 200,000 of them.
+// SAX handler that builds the document within the bounds. The library's parser with a callback rescans the enclosing
+// array after every object: a minute for 200,000 of them.
 class BoundedBuilder : public nlohmann::json_sax<nlohmann::json> {
  public:
   explicit BoundedBuilder(nlohmann::json& root) : root_(&root) {}
@@ -52,7 +52,7 @@ class BoundedBuilder : public nlohmann::json_sax<nlohmann::json> {
   }
 
  private:
-  // Where the value is now; null when there are too many.
+  // Stores a value and returns its location; null if there are too many.
   nlohmann::json* Put(nlohmann::json value) {
     if (++values_ > kMaxValues) {
       problem_ = Cat("more than ", WithThousands(kMaxValues), " values");
@@ -64,7 +64,7 @@ class BoundedBuilder : public nlohmann::json_sax<nlohmann::json> {
     }
     nlohmann::json& parent = *open_.back();
     if (parent.is_array()) return &parent.emplace_back(std::move(value));
-    return &(parent[key_] = std::move(value));  // of two members of one name the last one counts
+    return &(parent[key_] = std::move(value));  // the last of duplicate members counts
   }
   bool Begin(nlohmann::json value) {
     if (open_.size() >= kMaxDepth) {
@@ -81,7 +81,7 @@ class BoundedBuilder : public nlohmann::json_sax<nlohmann::json> {
   }
 
   nlohmann::json* root_;
-  std::vector<nlohmann::json*> open_;  // from the outermost inwards; only the innermost grows, so all stay in place
+  std::vector<nlohmann::json*> open_;  // outermost first; only the innermost grows, so pointers stay valid
   std::string key_;                    // of the next member
   std::string problem_;
   size_t values_ = 0;

@@ -6,12 +6,12 @@
 
 namespace anchorsplat {
 
-// All our binary formats are little-endian, and so is every machine we build for; values are taken over byte for byte.
+// All our binary formats and target machines are little-endian, so values are copied byte for byte.
 static_assert(std::endian::native == std::endian::little);
 
-// The number of type T at an address of any alignment.
+// Loads a T from an address of any alignment.
 template <typename T>
-T LoadLittle(const void* at) {
+T LoadLittleEndian(const void* at) {
   static_assert(std::is_arithmetic_v<T>);
   T value;
   std::memcpy(&value, at, sizeof value);

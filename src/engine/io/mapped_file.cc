@@ -43,7 +43,7 @@ Status ReadWhole(int descriptor, const std::filesystem::path& path, Buffer<std::
 }  // namespace
 
 Result<MappedFile> MappedFile::Open(const std::filesystem::path& path) {
-  // O_NONBLOCK: opening a pipe that nobody writes to must not wait for ever; regular files ignore it.
+  // O_NONBLOCK: opening a pipe without a writer must not block forever; regular files ignore it.
   const Descriptor file{open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};
   if (file.number < 0) {
     if (errno == ENOENT || errno == ENOTDIR) return Error{ErrorCode::kNotFound, Cat(path.string(), ": no such file")};
@@ -65,7 +65,7 @@ Result<MappedFile> MappedFile::Open(const std::filesystem::path& path) {
   const auto size = static_cast<size_t>(info.st_size);
   void* memory = mmap(nullptr, size, PROT_READ, MAP_PRIVATE, file.number, 0);
   if (memory != MAP_FAILED) {
-    madvise(memory, size, MADV_WILLNEED);  // only a hint: a cold file is read ahead instead of page by page
+    madvise(memory, size, MADV_WILLNEED);  // a hint: read ahead instead of page by page
     mapped.mapping_ = memory;
     mapped.bytes_ = {static_cast<const std::byte*>(memory), size};
     return mapped;

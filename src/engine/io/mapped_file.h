@@ -9,21 +9,20 @@
 
 namespace anchorsplat {
 
-// The bytes of a file without reading them: pages come from the system's cache when they are first touched, so opening
-// costs the same for one kilobyte and for ten gigabytes. Move-only; bytes() stays where it is when the object moves.
+// A memory-mapped file: opening costs the same for any size, and pages are loaded when touched. Move-only; bytes()
+// stays valid when the object moves.
 //
-// Hazard, and our choice: when another process *shortens* the file while it is mapped, touching a page past the new
-// end raises SIGBUS and ends the program. We accept that, as every program that maps weights does: the alternatives are
-// a copy of the whole file, which is what mapping is there to avoid, or a signal handler for the whole process. Writers
-// of this program never change a file in place (they write beside it and rename), which leaves old mappings intact.
-// Contents that change under the mapping are harmless to memory safety: all sizes and offsets are read once, when a
-// file is opened.
+// Hazard: if another process *shortens* the file while it is mapped, touching a page past the new end ends the program
+// (SIGBUS). We accept that, as other programs that map weights do: the alternatives are a copy of the file or a
+// process-wide signal handler. This program never changes files in place (it writes beside and renames), so its own
+// writers leave mappings intact. Contents that change under the mapping cannot break memory safety: sizes and offsets
+// are read once, on opening.
 class MappedFile {
  public:
-  // Maps a regular file. A file system that cannot map is read into memory instead.
-  // Errors: kNotFound; kIo, also for folders, pipes and devices.
+  // Maps a regular file, or reads it into memory if the file system cannot map. Errors: kNotFound; kIo: also for
+  // folders, pipes and devices.
   static Result<MappedFile> Open(const std::filesystem::path& path);
-  // The same view of bytes that are in memory already.
+  // A MappedFile of bytes in memory.
   static MappedFile FromBytes(Buffer<std::byte> bytes);
 
   MappedFile(MappedFile&& other) noexcept;
@@ -36,7 +35,7 @@ class MappedFile {
   MappedFile() = default;
 
   std::span<const std::byte> bytes_;
-  void* mapping_ = nullptr;  // what munmap gets; null when the bytes are `owned_`
+  void* mapping_ = nullptr;  // for munmap; null if the bytes are in owned_
   Buffer<std::byte> owned_;
 };
 

@@ -10,13 +10,12 @@
 
 namespace anchorsplat {
 
-// Where an OutputFile (atomic_file.h) is put instead of a folder: files in memory by their names, whole or not at all.
+// In-memory destination for OutputFiles (atomic_file.h): complete files by name.
 struct OutputMemory {
   std::map<std::filesystem::path, std::vector<std::byte>> files;
 };
 
-// The bytes of one that is being written. Disjoint ranges may be written from several threads; what nobody has written
-// is 0, as in a file.
+// A file in memory that is being written. Thread-safe for disjoint ranges; gaps are 0, as in a file.
 class MemoryBytes {
  public:
   void Reserve(uint64_t size);
@@ -24,7 +23,7 @@ class MemoryBytes {
   std::vector<std::byte> Take() { return std::move(bytes_); }
 
  private:
-  std::shared_mutex mutex_;  // alone: to grow
+  std::shared_mutex mutex_;  // exclusive while growing
   std::vector<std::byte> bytes_;
 };
 

@@ -18,7 +18,7 @@ Result<StagedFolder> StagedFolder::Create(const fs::path& file) {
   StagedFolder staged(std::move(lock));
   const fs::path path = folder / (name + ".partial");
   std::error_code failed;
-  fs::remove_all(path, failed);  // of a run that was killed
+  fs::remove_all(path, failed);  // left by a killed run
   if (!failed) fs::create_directory(path, failed);
   if (failed) return Error{ErrorCode::kIo, Cat(path.string(), ": cannot make this folder: ", failed.message())};
   staged.path_ = path;

@@ -10,10 +10,10 @@
 
 namespace anchorsplat {
 
-// Folders that a file names, as the chunks of a scene and of a page: they are filled under a hidden name beside that
-// file, get their names together once all are whole, and then the file gets its own. Until then nothing under its name
-// has changed, however the process ends. What a killed run leaves is a hidden folder, which the next one for the same
-// file clears away.
+// Publishes folders that a file refers to, such as the chunks of a scene or a page. They are filled under a hidden name
+// beside the file, get their names together when complete, and then the file gets its own. Until then nothing visible
+// has changed, however the process ends. A killed run leaves a hidden folder, which the next run for the same file
+// removes.
 //
 //   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile index, OutputFile::Create(path, overwrite));
 //   ANCHORSPLAT_ASSIGN_OR_RETURN(StagedFolder staged, StagedFolder::Create(path));
@@ -23,18 +23,17 @@ namespace anchorsplat {
 //   staged.Keep();
 class StagedFolder {
  public:
-  // Beside `file`, whose folder is there. Errors: kExists when another process is writing the same file; kIo.
+  // Stages beside `file`, whose folder must exist. Errors: kExists: another process is writing the same file; kIo.
   static Result<StagedFolder> Create(const std::filesystem::path& file);
   StagedFolder(StagedFolder&& other) noexcept;
   StagedFolder& operator=(StagedFolder&&) = delete;
-  // Takes away what has no name yet and, unless they are kept, those that have.
+  // Removes unpublished folders, and published ones unless Keep() was called.
   ~StagedFolder();
 
   const std::filesystem::path& path() const { return path_; }
-  // Gives the folders `from` in it the names `to` beside the file: all or none. Nothing that is there is replaced: an
-  // error (kIo), as is whatever else the system has against it.
+  // Renames the staged folders `from` to `to` beside the file: all or none. Never replaces anything. Errors: kIo.
   Status Publish(std::span<const std::string> from, std::span<const std::string> to);
-  // They stay: the file that names them is there.
+  // Makes published folders permanent, once the file that refers to them exists.
   void Keep() { published_.clear(); }
 
  private:

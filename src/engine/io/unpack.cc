@@ -23,7 +23,7 @@ std::unique_ptr<InflatingReader> OpenPacked(const InputFile& file, Packing packi
   return OpenZstd(file, 0, file.size());
 }
 
-// Tapes and block devices fill up with zeros.
+// Tapes and block devices pad with zeros.
 Result<bool> AreZeros(const InputFile& file, uint64_t begin) {
   SequentialReader reader(file, begin);
   for (;;) {
@@ -48,7 +48,7 @@ Status WarnOfBytesBehind(const InputFile& file, uint64_t behind, Packing packing
 }  // namespace
 
 Packing PackingOf(std::string_view head) {
-  // The only method there is, and no flag of those that are not given out.
+  // Only deflate (the only method), and no reserved flags.
   if (head.size() >= 10 && head.starts_with("\x1f\x8b\x08") && (Byte(head, 3) & 0xe0) == 0) return Packing::kGzip;
   if (head.starts_with("\x28\xb5\x2f\xfd")) return Packing::kZstd;
   return Packing::kNone;
@@ -65,7 +65,7 @@ Result<std::string> HeadInside(const InputFile& file, Packing packing, size_t si
   return head;
 }
 
-Result<InputFile> Unpack(const InputFile& file, Packing packing, uint64_t paid) {
+Result<InputFile> Unpack(const InputFile& file, Packing packing, uint64_t compressed_size) {
   const std::unique_ptr<InflatingReader> reader = OpenPacked(file, packing);
   Buffer<char> bytes;
   for (;;) {
@@ -74,10 +74,10 @@ Result<InputFile> Unpack(const InputFile& file, Packing packing, uint64_t paid) 
     bytes.resize(had + kPiece);
     ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t read, reader->ReadSome(bytes.data() + had, kPiece));
     bytes.resize(had + read);
-    ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(file.name(), paid, bytes.size()));
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckCompressionRatio(file.name(), compressed_size, bytes.size()));
     if (read < kPiece) break;
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(WarnOfBytesBehind(file, reader->BytesBehind(), packing));
+  ANCHORSPLAT_RETURN_IF_ERROR(WarnOfBytesBehind(file, reader->TrailingBytes(), packing));
   return InputFile::Inside(file, Cat(file.name(), " (unpacked)"), std::move(bytes));
 }
 

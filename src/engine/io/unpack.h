@@ -9,22 +9,22 @@
 
 namespace anchorsplat {
 
-// What lies around a whole file: servers and people compress files that know nothing of it.
+// Compression around a whole file, added by servers and users to formats that do not specify it.
 enum class Packing { kNone, kGzip, kZstd };
 
-// By the first bytes of a file; ten are enough.
+// Detects the compression from the first ten or more bytes of a file.
 Packing PackingOf(std::string_view head);
 std::string_view NameOf(Packing packing);  // "gzip"
 
-// The first bytes of what a packed file holds, at most `size`. Errors (kBadFile): damaged, cut off.
+// The first `size` decompressed bytes at most. Errors (kBadFile): damaged, truncated.
 Result<std::string> HeadInside(const InputFile& file, Packing packing, size_t size);
 
-// All that a packed file holds. `paid`: the size of the file that it comes from, to which what comes out is compared
-// (compression_ratio.h) as it comes: nothing is allocated for what the data promises. Bytes behind the data are not
-// read, which a warning says unless they are zeros. Errors (kBadFile): damaged, cut off, a decompression bomb.
-Result<InputFile> Unpack(const InputFile& file, Packing packing, uint64_t paid);
+// Decompresses a whole file. `compressed_size`: size of the original file, against which the output is checked while it
+// grows (compression_ratio.h), so claimed sizes never cause allocations. Trailing bytes are ignored, with a warning
+// unless they are zeros. Errors (kBadFile): damaged, truncated, a decompression bomb.
+Result<InputFile> Unpack(const InputFile& file, Packing packing, uint64_t compressed_size);
 
-// The name that a gzip file says its content had; empty where it says none. `head`: its first bytes.
+// The original file name in a gzip header; empty if there is none. `head`: the file's first bytes.
 std::string NameInGzip(std::string_view head);
 
 }  // namespace anchorsplat

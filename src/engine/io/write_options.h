@@ -4,10 +4,10 @@ namespace anchorsplat {
 
 struct OutputMemory;
 
-// What all writers of files take.
+// Options of all file writers.
 struct WriteOptions {
-  bool overwrite = false;          // an existing file is kExists otherwise
-  OutputMemory* memory = nullptr;  // the files go there instead of a folder (io/output_memory.h)
+  bool overwrite = false;          // false: an existing file is an error (kExists)
+  OutputMemory* memory = nullptr;  // write files there instead of to a folder (io/output_memory.h)
 };
 
 }  // namespace anchorsplat

@@ -44,14 +44,14 @@ uint32_t Crc(uint32_t crc, std::string_view bytes) {
   return crc;
 }
 
-// The whole of a raw deflate stream, which must make exactly contents.size() bytes.
+// Inflates a raw deflate stream that must give exactly contents.size() bytes.
 bool Inflate(std::span<const std::byte> packed, std::string& contents) {
   z_stream stream{};
   if (inflateInit2(&stream, -MAX_WBITS) != Z_OK) throw std::bad_alloc();
   constexpr size_t kMost = size_t{1} << 30;
   size_t in = 0, out = 0;
   int code = Z_OK;
-  char beyond = 0;  // room for the end of the stream to be seen, and for a byte too many to be noticed
+  char beyond = 0;  // lets inflate reach the end of the stream, and catches one byte too many
   while (code == Z_OK) {
     const auto in_chunk = static_cast<uInt>(std::min(kMost, packed.size() - in));
     const auto out_chunk = static_cast<uInt>(std::min(kMost, contents.size() - out));
@@ -71,7 +71,7 @@ bool Inflate(std::span<const std::byte> packed, std::string& contents) {
   return code == Z_STREAM_END && out == contents.size();
 }
 
-constexpr uint16_t kVersion = 45;            // that knows the 64-bit extensions
+constexpr uint16_t kVersion = 45;            // 4.5: with zip64
 constexpr uint16_t kUtf8 = 0x0800;           // names are UTF-8
 constexpr uint32_t kFirstOf1980 = 0x210000;  // date 1980-01-01, time 0:00
 
@@ -114,7 +114,7 @@ Result<std::string> ZipReader::Read(const std::string& member, uint64_t max_size
   if (entry->method == 0) {
     contents.assign(reinterpret_cast<const char*>(entry->data.data()), entry->data.size());
   } else if (entry->method == 8) {
-    ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(where, entry->data.size(), entry->size));
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckCompressionRatio(where, entry->data.size(), entry->size));
     contents.resize(static_cast<size_t>(entry->size));
     if (!Inflate(entry->data, contents)) return Error{ErrorCode::kBadFile, Cat(where, ": is damaged or cut off")};
   } else {

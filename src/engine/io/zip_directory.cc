@@ -30,7 +30,7 @@ struct Directory {
   uint64_t entries = 0;
 };
 
-// Where an entry lies: its local header, then its data.
+// Location of an entry: local header, then data.
 struct Extent {
   uint64_t begin;
   uint64_t end;
@@ -69,16 +69,16 @@ class DirectoryReader {
   }
 
   bool Has(uint64_t at, uint64_t bytes) const { return at <= archive_.size() && bytes <= archive_.size() - at; }
-  uint16_t U16(uint64_t at) const { return LoadLittle<uint16_t>(archive_.data() + at); }
-  uint32_t U32(uint64_t at) const { return LoadLittle<uint32_t>(archive_.data() + at); }
-  uint64_t U64(uint64_t at) const { return LoadLittle<uint64_t>(archive_.data() + at); }
+  uint16_t U16(uint64_t at) const { return LoadLittleEndian<uint16_t>(archive_.data() + at); }
+  uint32_t U32(uint64_t at) const { return LoadLittleEndian<uint32_t>(archive_.data() + at); }
+  uint64_t U64(uint64_t at) const { return LoadLittleEndian<uint64_t>(archive_.data() + at); }
   std::string_view Text(uint64_t at, uint64_t bytes) const {
     return {reinterpret_cast<const char*>(archive_.data()) + at, static_cast<size_t>(bytes)};
   }
 
   Result<Directory> FindDirectory() const {
     const uint64_t size = archive_.size();
-    // The end record is last, followed only by a comment of at most 64 kB whose length it knows.
+    // The end record is last, followed only by a comment of at most 64 kB with a known length.
     uint64_t at = size < kEndSize ? 0 : size - kEndSize;
     const uint64_t lowest = at > 0xffff ? at - 0xffff : 0;
     while (!(Has(at, kEndSize) && U32(at) == kEndMagic && at + kEndSize + U16(at + 20) == size)) {
@@ -91,7 +91,7 @@ class DirectoryReader {
     }
     uint64_t disk = U16(at + 4);
     Directory directory{U32(at + 16), U32(at + 12), U16(at + 10)};
-    uint64_t records = at;  // the directory ends before the first end record
+    uint64_t records = at;  // the directory ends before the end records
     if (at >= kLocator64Size && U32(at - kLocator64Size) == kLocator64Magic) {
       const uint64_t at64 = U64(at - kLocator64Size + 8);
       if (!Has(at64, kEnd64Size) || at64 + kEnd64Size > at - kLocator64Size || U32(at64) != kEnd64Magic) {
@@ -106,7 +106,7 @@ class DirectoryReader {
       return Bad(at, Cat("the zip directory (", directory.size, " bytes at ", directory.offset,
                          ") lies outside the file: it is cut off or damaged"));
     }
-    // Bounds the loop and its allocations by bytes that are really there.
+    // Bounds loop and allocations by the actual bytes.
     if (directory.entries > directory.size / kCentralSize) {
       return Bad(at,
                  Cat("the zip directory of ", directory.size, " bytes cannot hold ", directory.entries, " entries"));
@@ -114,7 +114,7 @@ class DirectoryReader {
     return directory;
   }
 
-  // Replaces the fields that say "look in zip64" by those of the extra field, which come in this order.
+  // Replaces fields marked as zip64 by those of the extra field, which are in this order.
   bool ApplyZip64(uint64_t at, uint64_t length, uint64_t& stored, uint64_t& packed, uint64_t& header) const {
     const uint64_t end = at + length;
     while (end - at >= 4) {
@@ -137,7 +137,7 @@ class DirectoryReader {
     return stored != kIn64Field && packed != kIn64Field && header != kIn64Field;
   }
 
-  // Reads the central record at `at` and moves it on.
+  // Reads the central record at `at` and advances it.
   Status ReadCentral(uint64_t& at, uint64_t end, uint64_t data_end, std::vector<ZipEntry>& entries,
                      std::vector<Extent>& extents) const {
     if (end - at < kCentralSize || U32(at) != kCentralMagic) {

@@ -11,22 +11,21 @@
 
 namespace anchorsplat {
 
-// One file inside a zip archive; name and data are views into the archive's bytes.
+// A file in a zip archive; name and data point into the archive's bytes.
 struct ZipEntry {
   std::string_view name;
-  std::span<const std::byte> data;  // as they lie in the archive
+  std::span<const std::byte> data;  // compressed
   int method = 0;                   // 0 stored, 8 deflated
-  uint64_t size = 0;                // of the contents
-  uint32_t crc = 0;                 // of the contents
+  uint64_t size = 0;                // of the decompressed contents
+  uint32_t crc = 0;                 // of the decompressed contents
 };
 
-// The entries of a zip archive in the order of the central directory. zip64 and data descriptors are understood: sizes
-// come from the central directory, because local headers may say zero there. Every range lies within `archive`, and no
-// two entries share bytes.
+// Reads the entries of a zip archive in the order of the central directory. Handles zip64 and data descriptors: sizes
+// come from the central directory, as local headers may have zeros. All ranges lie within `archive` and do not overlap.
 //
-// Errors (kBadFile, beginning with `file` and the byte): no end record, which is what a truncated file looks like;
-// several disks; a directory that does not hold what its count promises; an entry that is encrypted, outside the file,
-// overlapping another or of the same name, or stored in fewer bytes than it has.
+// Errors (kBadFile, starting with `file` and the byte): no end record, as in a truncated file; multiple disks; a
+// directory with fewer entries than its count; an entry that is encrypted, outside the file, overlaps or has the name
+// of another, or is stored in fewer bytes than its size.
 Result<std::vector<ZipEntry>> ReadZipDirectory(std::span<const std::byte> archive, const std::string& file);
 
 }  // namespace anchorsplat

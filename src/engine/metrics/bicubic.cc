@@ -14,7 +14,7 @@ namespace {
 
 constexpr size_t kTaps = 4;
 
-// Where one pixel of the larger side comes from.
+// Source taps of one output pixel.
 struct Taps {
   std::array<int, kTaps> at{};
   std::array<float, kTaps> weight{};

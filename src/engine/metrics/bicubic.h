@@ -5,9 +5,9 @@
 
 namespace anchorsplat {
 
-// An enlarged picture by cubic convolution (Keys 1981, a = −1/2, as Pillow and MATLAB have it): pixel areas stay where
-// they are (pixel centres at +0.5), rows and columns beyond the border repeat it. Values may leave their range beside
-// edges; clamp them. kBadArgument: an empty picture, a size smaller than the picture's own or too large.
+// Enlarges by cubic convolution (Keys 1981, a = −1/2, as in Pillow and MATLAB), with pixel areas aligned (pixel centres
+// at +0.5) and border pixels repeated. Values can overshoot at edges; clamp them. kBadArgument: an empty image, or a
+// size smaller than the image or too large.
 Result<Image> EnlargeBicubic(const Image& image, int width, int height);
 
 }  // namespace anchorsplat

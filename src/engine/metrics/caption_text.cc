@@ -6,14 +6,14 @@
 #include <utility>
 #include <vector>
 
-// It uses ceil and says so nowhere.
+// It uses ceil without including its header.
 #include <stb/stb_easy_font.h>
 
 namespace anchorsplat {
 
 namespace {
 
-// What the font has letters for.
+// Replaces characters that the font lacks.
 std::string Printed(std::string text) {
   for (char& c : text) {
     if (c < ' ' || c > '~') c = '?';
@@ -27,9 +27,9 @@ struct Corner {
 };
 using Box = std::array<Corner, 4>;  // clockwise from the upper left
 
-// The letters as boxes of whole pixels, the first letter's upper left corner at (0, 0).
+// Glyphs as boxes in font pixels, upper left corner at (0, 0).
 std::vector<Box> Letters(std::string text) {
-  constexpr size_t kMostBoxes = 24;  // of a letter; the font's largest has fewer
+  constexpr size_t kMostBoxes = 24;  // per letter; the font's maximum is lower
   std::vector<Box> boxes(kMostBoxes * text.size());
   const int count =
       stb_easy_font_print(0, 0, text.data(), nullptr, boxes.data(), static_cast<int>(boxes.size() * sizeof(Box)));
@@ -44,7 +44,7 @@ int TextWidth(const std::string& text, int scale) {
   return (stb_easy_font_width(Printed(text).data()) - 1) * scale;  // without the gap after the last letter
 }
 
-std::string FittingText(const std::string& text, int width, int scale, const std::string& ending) {
+std::string TruncatedText(const std::string& text, int width, int scale, const std::string& ending) {
   if (TextWidth(text, scale) <= width) return text;
   std::string cut = text;
   while (!cut.empty() && TextWidth(cut + ending, scale) > width) cut.pop_back();

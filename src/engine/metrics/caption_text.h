@@ -8,20 +8,19 @@
 
 namespace anchorsplat {
 
-// Captions on pictures: the letters of stb_easy_font, capitals seven pixels high, each pixel drawn as a square of
-// `scale`; g, j, p, q and y reach two pixels below. Printable ASCII; any other byte is drawn as '?'.
+// Captions in the font of stb_easy_font: capitals are seven font pixels high, each drawn as a square of `scale` pixels;
+// g, j, p, q and y reach two below the baseline. Printable ASCII; other bytes are drawn as '?'.
 inline constexpr int kCapitalHeight = 7;
 
 int TextWidth(const std::string& text, int scale);  // pixels
 
-// As much of the beginning of `text` as `width` pixels hold, followed by `ending` where something was cut off.
-std::string FittingText(const std::string& text, int width, int scale, const std::string& ending = "...");
+// The longest prefix of `text` that fits into `width` pixels, followed by `ending` if truncated.
+std::string TruncatedText(const std::string& text, int width, int scale, const std::string& ending = "...");
 
-// All of it, in lines of at most `width` pixels, broken between words; a word that is wider by itself is cut into
-// pieces.
+// Wraps `text` into lines of at most `width` pixels between words; a word wider than that is split.
 std::vector<std::string> WrappedText(const std::string& text, int width, int scale);
 
-// Draws with the upper left corner at (x, y) in `colour`; pixels outside of the image are left out.
+// Draws text with its upper left corner at (x, y); clips at the image border.
 void DrawText(Image& image, int x, int y, const std::string& text, int scale, const std::array<float, 3>& colour);
 
 }  // namespace anchorsplat

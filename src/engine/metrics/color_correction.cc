@@ -12,10 +12,10 @@ namespace anchorsplat {
 namespace {
 
 constexpr int64_t kPixelsPerTask = int64_t{1} << 15;
-// Variance of a channel: eight bits round by 1/255²/12 = 1.3e-6.
+// In variance of a channel; 8-bit rounding has 1/255²/12 = 1.3e-6.
 constexpr double kRidge = 1e-7;
 
-// Of the two pictures' colours x and t, relative to mid-grey so that little cancels.
+// Moments of the colours x and t of the two images, relative to mid-grey to reduce cancellation.
 struct Moments {
   std::array<double, 3> x{}, t{};    // sums
   std::array<double, 9> xx{}, tx{};  // sums of x·xᵀ and t·xᵀ

@@ -13,17 +13,17 @@ struct ColorMap {
   std::array<double, 3> offset = {0, 0, 0};
 };
 
-// The affine map that brings the colours of `image` nearest to those of `truth`, by least squares over all pixels: what
-// a camera's exposure and white balance, or the light, may have changed between two pictures of the same thing. Both
-// have three channels or more, of which three count, in 0–1.
+// Least-squares affine map from the colours of `image` to those of `truth` over all pixels: models differences in
+// exposure, white balance or light between two images of the same scene. Both need at least three channels in 0–1; the
+// first three are used.
 //
-// Colours that do not vary in some direction (grey pictures, a single colour) determine no map: in that direction it is
-// the identity about the mean. A small ridge sees to that, well below the rounding of eight bits, so that the map never
-// fits worse than a mere shift of the mean, and thus never worse than none. The identity where values are not finite.
-// Deterministic for any number of threads. kBadArgument: sizes or channels differ, fewer than three channels, no pixel.
+// If colours do not vary in some direction (grey images, a single colour), the map is the identity about the mean in
+// that direction. A small ridge, well below 8-bit rounding, ensures that; so the fit is never worse than shifting the
+// mean, or than no map. The identity for values that are not finite. Deterministic for any number of threads.
+// kBadArgument: sizes or channels differ, fewer than three channels, no pixel.
 Result<ColorMap> FitColors(const Image& image, const Image& truth);
 
-// `image` mapped, each value within 0–1; channels beyond the third stay.
+// Applies the map and clamps to 0–1; channels beyond the third stay.
 void ApplyColors(const ColorMap& map, Image& image);
 
 }  // namespace anchorsplat

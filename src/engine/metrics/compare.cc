@@ -17,7 +17,7 @@ namespace {
 
 Error Bad(std::string sentence) { return Error{ErrorCode::kBadArgument, std::move(sentence)}; }
 
-// The last `count` parts of a view's name, or all.
+// The last `count` components of a view's name, or all.
 std::string End(const std::vector<std::string>& parts, size_t count) {
   std::string end;
   for (size_t k = parts.size() - std::min(count, parts.size()); k < parts.size(); ++k) {
@@ -26,7 +26,7 @@ std::string End(const std::vector<std::string>& parts, size_t count) {
   return end;
 }
 
-// Indices by name, however marks are on its letters; names that occur again go to `repeated`, once each.
+// Indices by name, ignoring Unicode decomposition; duplicates are listed once in `repeated`.
 std::map<std::string, size_t> IndexByEnd(const std::vector<std::vector<std::string>>& views, size_t count,
                                          std::vector<std::string>& repeated) {
   std::map<std::string, size_t> index;
@@ -40,8 +40,8 @@ std::map<std::string, size_t> IndexByEnd(const std::vector<std::vector<std::stri
 
 using Parts = std::vector<std::string>;
 
-// How many folders all views are in, where they lie at different depths below: names begin there. Where all are as
-// deep, the last of these folders may be what tells them from others.
+// Number of common leading folders if the depth below them varies: names start after them. If all views are equally
+// deep, the last common folder may be needed to tell the lists apart.
 size_t CommonFolders(const std::vector<Parts>& views) {
   size_t common = views[0].size(), shortest = common, longest = common;
   for (const Parts& parts : views) {
@@ -57,8 +57,8 @@ bool IsEndOf(std::span<const std::string> end, const Parts& parts) {
          std::equal(end.begin(), end.end(), parts.end() - static_cast<ptrdiff_t>(end.size()));
 }
 
-// Pairs views whose whole name below the common folder is the end of the other's, where that is so of no third: "2" and
-// "images/2" beside "a/0" and "images/a/0".
+// Pairs views whose whole name below the common folder is a suffix of exactly one other's: "2" and "images/2" beside
+// "a/0" and "images/a/0".
 std::vector<ViewPair> PairByWholeNames(const std::vector<Parts>& a, const std::vector<size_t>& left_a,
                                        const std::vector<Parts>& b, const std::vector<size_t>& left_b) {
   const size_t common_a = CommonFolders(a), common_b = CommonFolders(b);
@@ -118,7 +118,7 @@ Result<ViewPairs> MatchViews(std::span<const std::string> a, std::span<const std
   }
   std::map<std::string, size_t> index_a, index_b;
   std::vector<std::string> repeated;
-  size_t count = 0;  // of parts that tell views apart
+  size_t count = 0;  // components needed to be unique
   do {
     ++count;
     repeated.clear();

@@ -14,7 +14,7 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int kSide = 400;            // pixels: a file's loss shows at any size, and this one takes no time
+constexpr int kSide = 400;            // pixels; loss shows at any size, and this one is fast
 constexpr double kFieldOfView = 0.8;  // radians
 
 }  // namespace
@@ -26,8 +26,8 @@ Result<ConversionLoss> MeasureConversionLoss(const CloudView& before, const Clou
                                OrbitCameras(views, FramingDistance(framing, intrinsics), framing.target, intrinsics));
   Rasterizer rasterizer;
   RenderOutput first, second;
-  RenderOptions options = OptionsFor(before);
-  // A format that has no place for the mode has not changed it.
+  RenderOptions options = DisplayOptions(before);
+  // A format that cannot store the mode has not changed it.
   options.mode = before.render_mode.value_or(after.render_mode.value_or(RenderMode::kClassic));
   ConversionLoss loss;
   loss.views = views;

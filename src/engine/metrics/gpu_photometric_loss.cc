@@ -17,7 +17,7 @@ constexpr int64_t kColors = 3, kMaps = 3, kSums = 3;
 const GpuKernel kSsimMaps = {"ssim_maps", {wgsl::kSsimWgsl}};
 const GpuKernel kPhotometricGradient = {"photometric_gradient", {wgsl::kSsimWgsl}};
 
-// `Loss` of ssim.wgsl.
+// Matches `Loss` in ssim.wgsl.
 struct Parameters {
   std::array<uint32_t, 2> size, tiles;
   std::array<uint32_t, 4> map;
@@ -38,12 +38,12 @@ Status GpuPhotometricLoss::Compare(int width, int height, const GpuPicture& rend
     return Error{ErrorCode::kBadArgument,
                  Cat("pictures of ", width, " x ", height, " are too large for this GPU to compare")};
   }
-  // Without SSIM there are no maps, but a kernel's binding cannot be empty.
+  // No maps are needed without SSIM, but bindings cannot be empty.
   const bool similarity = options.ssim_weight > 0;
   const int64_t at_once = kColors * bytes <= seen ? kColors : 1;
   const int64_t tiles_x = (width + kTileSide - 1) / kTileSide, tiles_y = (height + kTileSide - 1) / kTileSide;
   const auto room = [&](GpuMemory& memory, int64_t floats, std::string_view what) {
-    return GpuRoom(*device_, memory, static_cast<uint64_t>(floats) * sizeof(float), what);
+    return EnsureGpuMemory(*device_, memory, static_cast<uint64_t>(floats) * sizeof(float), what);
   };
   ANCHORSPLAT_RETURN_IF_ERROR(room(maps_, similarity ? at_once * of_a_channel : 1, "maps of the loss"));
   ANCHORSPLAT_RETURN_IF_ERROR(room(sums_, kColors * tiles_x * tiles_y * kSums, "sums of the loss"));

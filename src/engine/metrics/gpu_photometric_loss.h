@@ -10,35 +10,34 @@
 
 namespace anchorsplat {
 
-// Where the three channels of a picture lie in a buffer of floats. Channels one after the other, as in Image: 1 and
-// width × height.
+// Layout of a three-channel image in a float buffer. Planar, as in Image: strides 1 and width × height.
 struct GpuPicture {
   const GpuBuffer* buffer = nullptr;
-  uint32_t pixel_stride = 1;    // floats from one pixel to the next, along the row and then down
-  uint32_t channel_stride = 0;  // floats from one channel to the next
+  uint32_t pixel_stride = 1;    // in floats, to the next pixel (row-major)
+  uint32_t channel_stride = 0;  // in floats, to the next channel
 };
 
-// A value of a target that says: of this pixel nothing is asked. It counts as equal to what is rendered there.
-inline constexpr float kNotAsked = -1;
+// Target value of pixels to ignore: they count as equal to the rendering.
+inline constexpr float kIgnoredPixel = -1;
 
 struct GpuPhotometricLossValue {
   PhotometricLossValue loss;
-  double mean_square = 0;  // of the differences: −10·log10 of it is the PSNR in dB
+  double mean_square = 0;  // mean squared difference; PSNR in dB is −10·log10 of it
 };
 
-// PhotometricLoss of pictures that are on the GPU, with a gradient that stays there: metrics/ssim.wgsl. Values and
-// gradients are those of the CPU up to rounding, and the same bits at every run.
+// PhotometricLoss for images on the GPU, with a gradient that stays there (metrics/ssim.wgsl). Matches the CPU up to
+// rounding, and is bit-identical in every run.
 class GpuPhotometricLoss {
  public:
   explicit GpuPhotometricLoss(std::shared_ptr<GpuDevice> device) : device_(std::move(device)) {}
 
-  // Records the comparison of two pictures of width × height pixels: `gradient` becomes ∂loss/∂rendered, everywhere.
-  // Values below −0.5 of `wanted` ask for nothing (kNotAsked). Errors: those of PhotometricLoss, of
-  // GpuDevice::Allocate; kBadArgument: a picture so large that a kernel does not see all of it.
+  // Records a comparison of two images of width × height pixels; `gradient` receives ∂loss/∂rendered for all pixels.
+  // Pixels of `wanted` below −0.5 are ignored (kIgnoredPixel). Errors: those of PhotometricLoss and
+  // GpuDevice::Allocate; kBadArgument: an image too large for one binding.
   Status Compare(int width, int height, const GpuPicture& rendered, const GpuPicture& wanted,
                  const PhotometricLossOptions& options, const GpuPicture& gradient);
 
-  // Of the last Compare; waits for it. Errors: those of GpuDevice::Read.
+  // Result of the last Compare; waits for it. Errors: those of GpuDevice::Read.
   Result<GpuPhotometricLossValue> Value();
 
  private:

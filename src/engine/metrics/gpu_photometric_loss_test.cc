@@ -146,7 +146,7 @@ TEST_F(GpuPhotometricLossTest, AsksNothingWhereTheTargetSaysSo) {
   for (int c = 0; c < 3; ++c) {
     for (int y = 10; y < 30; ++y) {
       for (int x = 15; x < 40; ++x) {
-        pictures.wanted.at(c, y, x) = kNotAsked;
+        pictures.wanted.at(c, y, x) = kIgnoredPixel;
         filled.wanted.at(c, y, x) = filled.rendered.at(c, y, x);
       }
     }

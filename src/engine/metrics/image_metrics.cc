@@ -15,7 +15,7 @@ namespace anchorsplat {
 
 namespace {
 
-// Colour channels that count: alpha does not.
+// Colour channels; alpha is ignored.
 int ColourChannels(const Image& image) { return std::min(image.channels, 3); }
 
 Status CheckComparable(const Image& a, const Image& b) {
@@ -29,8 +29,8 @@ Status CheckComparable(const Image& a, const Image& b) {
   return {};
 }
 
-// Independent partial sums, so that the compiler may keep them in one register each: float squares of one short run,
-// then doubles. The order is fixed, so the result is too.
+// Independent partial sums that fit in registers: float squares over a short run, then doubles. The fixed order makes
+// the result deterministic.
 double SumOfSquaredDifferences(const float* a, const float* b, int64_t count) {
   constexpr int64_t kRun = 256;
   constexpr int64_t kLanes = 16;
@@ -69,7 +69,7 @@ double SumOfSquares(const Image& a, const Image& b) {
 }
 
 double SumOfDissimilarities(const Image& a, const Image& b, const uint8_t* ignored) {
-  // A chunk is a band of rows of one channel; bands never straddle channels.
+  // A chunk is a band of rows of one channel.
   constexpr int64_t kRows = 32;
   const int64_t bands = (a.height + kRows - 1) / kRows;
   const int channels = ColourChannels(a);

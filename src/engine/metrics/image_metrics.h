@@ -10,29 +10,29 @@
 namespace anchorsplat {
 
 // Peak signal-to-noise ratio in dB over all pixels of the first three channels, peak 1: −10·log10(MSE). Infinite for
-// identical images. Values are used as given (clamp renders first). kBadArgument: sizes or channels differ.
+// identical images. Clamp renderings first. kBadArgument: sizes or channels differ.
 Result<double> Psnr(const Image& a, const Image& b);
 
-// Mean structural similarity (Wang et al. 2004) over pixels and the three channels: 11×11 Gaussian window, σ 1.5, zero
-// padding ("same"), C1 = 0.01², C2 = 0.03². Deterministic for any number of threads. kBadArgument as above.
+// Mean structural similarity (Wang et al. 2004) over pixels and three channels: 11×11 Gaussian window, σ 1.5, zero
+// padding ("same"), C1 = 0.01², C2 = 0.03². Deterministic for any number of threads. Errors as above.
 Result<double> Ssim(const Image& a, const Image& b);
 
-// Of the pixels of a view that count.
+// Quality over the pixels that count.
 struct MaskedQuality {
   int64_t counted = 0;  // pixels; 0: nothing was measured
   double psnr = 0;      // dB
-  double ssim = 0;      // mean of the map of Ssim over them
+  double ssim = 0;      // mean of the SSIM map over them
 };
 
-// The same two over the pixels whose `ignored` ([H,W]) is 0; empty: all. What is ignored has to be the same in both
-// pictures, as FillIgnored makes it, so that the windows of others see no difference there.
-// kBadArgument as above, or `ignored` is of another size.
+// PSNR and SSIM over the pixels with `ignored` ([H,W]) 0; empty: all. Ignored pixels must be equal in both images, as
+// FillIgnored makes them, so that windows that reach into them see no difference. kBadArgument: as above; `ignored` has
+// another size.
 Result<MaskedQuality> MeasureMasked(const Image& a, const Image& b, std::span<const uint8_t> ignored);
 
-// What to say of views that are left out because a mask leaves nothing of them: `names`, of `count` views.
+// Message about views left out because they are fully masked: `names`, of `count` views.
 std::string WhollyMasked(std::span<const std::string> names, int64_t count);
 
-// max(0, min(1, x)) everywhere.
+// Clamps all values to 0–1.
 void Clamp01(Image& image);
 
 // Takes what `shown` has where nothing is asked of `picture`, so that the two do not differ there.

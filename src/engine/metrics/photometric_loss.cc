@@ -13,10 +13,10 @@ namespace anchorsplat {
 namespace {
 
 constexpr int kChannels = 3;
-constexpr int kRowsPerBand = 64;  // compared at once
+constexpr int kRowsPerBand = 64;  // rows per task of the comparison
 
-// Rows of a task's gradient. It needs twenty more of the pictures, so large pictures have large tasks; small ones would
-// leave threads without work.
+// Gradient rows per task. Each needs twenty more rows of the images, so large images have large tasks; small images
+// need small ones to occupy all threads.
 constexpr int RowsPerTask(int rows) { return rows > 512 ? 128 : 64; }
 
 Error BadArgument(std::string message) { return {ErrorCode::kBadArgument, std::move(message)}; }
@@ -31,9 +31,9 @@ Status Check(const Image& rendered, const Image& target, const PhotometricLossOp
   return CheckPhotometricLoss(rendered.width, rendered.height, options);
 }
 
-// The first of n numbers that differ, n if none does. NaN differs.
+// Index of the first difference in n numbers, n if there is none. NaN differs.
 int FirstDifference(const float* p, const float* q, int n) {
-  constexpr int kRun = 32;  // compared without asking in between
+  constexpr int kRun = 32;  // compared without branches
   int i = 0;
   for (; i + kRun <= n; i += kRun) {
     unsigned differ = 0;
@@ -44,7 +44,7 @@ int FirstDifference(const float* p, const float* q, int n) {
   return i;
 }
 
-// 1 + the last of [from, n) that differs, `from` if none does.
+// 1 + index of the last difference in [from, n), `from` if there is none.
 int EndOfDifference(const float* p, const float* q, int from, int n) {
   constexpr int kRun = 32;
   for (; n - kRun >= from; n -= kRun) {
@@ -56,7 +56,7 @@ int EndOfDifference(const float* p, const float* q, int from, int n) {
   return n;
 }
 
-// The smallest box that holds all pixels of rows [first, last) that differ.
+// Bounding box of the differing pixels in rows [first, last).
 PixelBox BoxOfDifference(const Image& a, const Image& b, int first, int last) {
   PixelBox box = {a.width, last, 0, first};
   for (int c = 0; c < kChannels; ++c) {
@@ -66,7 +66,7 @@ PixelBox BoxOfDifference(const Image& a, const Image& b, int first, int last) {
       const int from = FirstDifference(p, q, a.width);
       if (from == a.width) continue;
       box.x0 = std::min(box.x0, from);
-      box.x1 = EndOfDifference(p, q, std::max(box.x1, from + 1), a.width);  // what lies before is known to be inside
+      box.x1 = EndOfDifference(p, q, std::max(box.x1, from + 1), a.width);  // columns before are already inside
       box.y0 = std::min(box.y0, y);
       box.y1 = std::max(box.y1, y + 1);
     }
@@ -119,8 +119,8 @@ Result<PhotometricLossValue> PhotometricLoss(const Image& rendered, const Image&
     return PhotometricLossValue{};
   }
 
-  // A pixel's SSIM is not 1 where its window sees a difference; and a pixel's gradient comes from all windows that it
-  // is in.
+  // SSIM differs from 1 if a pixel's window contains a difference; the gradient of a pixel comes from all windows that
+  // contain it.
   const bool valid = options.padding == SsimPadding::kValid;
   const PixelBox counted = valid ? Grown(picture, -kSsimRadius) : picture;
   const PixelBox map = options.ssim_weight > 0 ? Common(Grown(different, kSsimRadius), counted) : PixelBox{};
@@ -128,7 +128,7 @@ Result<PhotometricLossValue> PhotometricLoss(const Image& rendered, const Image&
   const double values = kChannels * static_cast<double>(rendered.plane());
   const double windows = kChannels * static_cast<double>(counted.x1 - counted.x0) * (counted.y1 - counted.y0);
 
-  // Strips of nearly the same width, in whole registers.
+  // Strips of similar width, in whole registers.
   const int strips = (box.x1 - box.x0 + kSsimStrip - 1) / kSsimStrip;
   const int strip_width = ((box.x1 - box.x0 + strips - 1) / strips + 15) / 16 * 16;
   const int rows_per_task = RowsPerTask(box.y1 - box.y0);

@@ -5,10 +5,10 @@
 
 namespace anchorsplat {
 
-// Where SSIM's 11×11 window reaches over the border of the picture.
+// Treatment of SSIM windows that cross the image border.
 enum class SsimPadding {
-  kSame,   // the picture goes on with zeros, every pixel counts: as the metric (metrics/image_metrics.h)
-  kValid,  // pixels nearer than 5 to the border do not count: as gsplat's trainer (fused-ssim's "valid")
+  kSame,   // zero padding, all pixels count: as in metrics/image_metrics.h
+  kValid,  // pixels within 5 of the border do not count: as in gsplat's trainer (fused-ssim's "valid")
 };
 
 struct PhotometricLossOptions {
@@ -23,20 +23,20 @@ struct PhotometricLossValue {
   double ssim = 1;
 };
 
-// The loss of 3DGS fits and, in the same call, its gradient: `gradient` becomes ∂loss/∂rendered [3,H,W] within `box`
-// and is 0 outside of it, where it is not written.
+// The loss of 3DGS fits and its gradient: `gradient` receives ∂loss/∂rendered [3,H,W] within `box`. Outside it is 0 and
+// not written.
 //
-// Where all pixels under a window are equal in both pictures, SSIM is 1 and its gradient 0. So the work is confined to
-// a box around the pixels that differ, which leaves out the background around an object; no approximation.
+// SSIM is 1 and its gradient 0 where all pixels under a window are equal in both images. Work is therefore confined to
+// a box around the pixels that differ, which skips the background of an object; this is exact.
 //
-// The result is the same for any number of threads. A pixel that is not a number makes the loss one, too.
+// Deterministic for any number of threads. A NaN pixel makes the loss NaN.
 //
-// Errors (kBadArgument): images that are not of three channels and one size; an SSIM weight outside of [0, 1]; with
-// kValid and a weight above 0, a side below 11 pixels.
+// Errors (kBadArgument): images without three channels or of different size; an SSIM weight outside [0, 1]; with kValid
+// and a weight above 0, a side below 11 pixels.
 Result<PhotometricLossValue> PhotometricLoss(const Image& rendered, const Image& target,
                                              const PhotometricLossOptions& options, Image& gradient, PixelBox& box);
 
-// What of that can be said before there are pictures: the errors of sizes (pixels) and options.
+// Checks sizes (pixels) and options before there are images. Errors as above.
 Status CheckPhotometricLoss(int width, int height, const PhotometricLossOptions& options);
 
 }  // namespace anchorsplat

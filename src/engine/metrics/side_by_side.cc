@@ -41,7 +41,7 @@ std::vector<float> Differences(const Image& a, const Image& b) {
   return out;
 }
 
-// Steps to the neighbours on the right and below.
+// Differences to the right and lower neighbours.
 std::vector<float> Detail(const Image& image) {
   std::vector<float> out(static_cast<size_t>(image.plane()));
   for (int y = 0; y < image.height; ++y) {
@@ -62,7 +62,7 @@ struct PanelSize {
   int width, height;
 };
 
-// Values given by a function of (channel, y, x) in a view of w × h, averaged over the area of every pixel of a panel.
+// Resamples a function of (channel, y, x) on a w × h view to a panel by area averaging.
 template <typename Value>
 Image Resampled(int w, int h, const PanelSize& panel, Value&& value) {
   Image out(panel.width, panel.height, 3);
@@ -86,7 +86,7 @@ Image Resampled(int w, int h, const PanelSize& panel, Value&& value) {
   return out;
 }
 
-// Black, violet, red, orange, pale yellow: dark to bright, so that it also reads without colours.
+// Black, violet, red, orange, pale yellow: increasing brightness, so that it also works in greyscale.
 Colour HeatColour(float value) {
   static constexpr Colour kStops[] = {
       {0.02f, 0.02f, 0.04f}, {0.32f, 0.07f, 0.43f}, {0.73f, 0.21f, 0.33f}, {0.98f, 0.55f, 0.04f}, {0.99f, 1.0f, 0.64f}};
@@ -106,7 +106,7 @@ void FillRectangle(Image& canvas, int x, int y, int width, int height, const Col
   }
 }
 
-// A frame of `thickness` around the rectangle, on its outside.
+// Draws a frame of `thickness` outside the rectangle.
 void DrawFrame(Image& canvas, int x, int y, const PanelSize& size, int thickness) {
   const auto [width, height] = size;
   const int outer = width + 2 * thickness;
@@ -126,11 +126,11 @@ void Paste(Image& canvas, const Image& panel, int x, int y) {
 }
 
 void DrawCaption(Image& canvas, int x, int y, int width, const std::string& text, int scale, const Colour& colour) {
-  DrawText(canvas, x, y, FittingText(text, width, scale), scale, colour);
+  DrawText(canvas, x, y, TruncatedText(text, width, scale), scale, colour);
 }
 
-// How large w × h pixels are shown: by a whole factor that makes them about as wide as `wanted`, or shrunk if even the
-// pixels themselves are more than a panel holds.
+// Display size of w × h pixels: an integer factor that makes them about `wanted` wide, or reduced if they exceed a
+// panel.
 PanelSize FitPanel(int w, int h, int wanted) {
   if (w <= kWidestPanel && h <= kHighestPanel) {
     const int factor = std::max(1, std::min((wanted + w / 2) / w, std::min(kWidestPanel / w, kHighestPanel / h)));
@@ -141,15 +141,15 @@ PanelSize FitPanel(int w, int h, int wanted) {
           std::max(1, static_cast<int>(std::lround(h * factor)))};
 }
 
-// Where everything goes, in pixels of the result.
+// Layout in pixels of the result.
 struct Layout {
   PanelSize view;
   PanelSize enlarged;
   int column;
   ViewRegion region;
-  int scale;  // of the captions
+  int scale;  // font scale of captions
   int margin;
-  int line;  // a frame's thickness
+  int line;  // frame thickness
   int caption_height;
   int view_y, enlarged_y, difference_y, credit_y, height;
   std::vector<std::string> credit_lines;
@@ -228,7 +228,7 @@ void DrawDifference(Image& canvas, const LabelledImage& entry, const LabelledIma
   Paste(canvas, Resampled(image.width, image.height, l.view, heat), x + l.centred(l.view), l.difference_y);
 }
 
-// What the colours of the maps mean, in the place of the reference's own map.
+// Colour scale, shown in place of the reference's own map.
 void DrawHeatScale(Image& canvas, float gain, const Layout& l, int x) {
   DrawCaption(canvas, x, l.difference_y - l.caption_height, l.column, "scale of the differences", l.scale, kDimText);
   const int height = std::min(l.view.height, l.margin);
@@ -273,7 +273,7 @@ Status CheckArguments(std::span<const LabelledImage> images, const SideBySideOpt
 ViewRegion MostDifferentRegion(const Image& a, const Image& b, int width, int height) {
   std::vector<float> weight = Differences(a, b);
   if (std::all_of(weight.begin(), weight.end(), [](float x) { return x == 0; })) weight = Detail(b);
-  // Summed-area table, one row and column of zeros before the first.
+  // Summed-area table with a leading row and column of zeros.
   const auto stride = static_cast<size_t>(b.width) + 1;
   std::vector<double> sums(stride * (static_cast<size_t>(b.height) + 1));
   for (size_t y = 0; y < static_cast<size_t>(b.height); ++y) {

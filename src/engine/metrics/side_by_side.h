@@ -16,7 +16,7 @@ struct LabelledImage {
   const Image* image = nullptr;
 };
 
-// A part of the views, in their pixels.
+// A region of the views, in view pixels.
 struct ViewRegion {
   int x = 0, y = 0, width = 0, height = 0;
 
@@ -24,25 +24,24 @@ struct ViewRegion {
 };
 
 struct SideBySideOptions {
-  double crop = 0.2;  // width of the enlarged part as a fraction of the view's, in (0, 1]
-  std::optional<ViewRegion> region =
-      std::nullopt;                       // the part itself; chosen by MostDifferentRegion where it is not given
-  bool differences = true;                // the row of difference maps
-  float gain = 4;                         // their brightest colour stands for a difference of 1 / gain
-  std::vector<std::string> credits = {};  // below all: whose the things shown are, each on lines of its own
+  double crop = 0.2;                                // width of the enlarged region relative to the view, in (0, 1]
+  std::optional<ViewRegion> region = std::nullopt;  // the enlarged region; default: MostDifferentRegion
+  bool differences = true;                          // add a row of difference maps
+  float gain = 4;                                   // the brightest colour of the maps is a difference of 1 / gain
+  std::vector<std::string> credits = {};            // attributions, each on its own lines at the bottom
 };
 
-// The region of the given size where `a` and `b` differ most (sum of absolute differences); where they are equal, the
-// one of `b` with most detail (sum of absolute steps between neighbours). The first in reading order among equals.
+// The region of the given size with the largest sum of absolute differences between `a` and `b`; if they are equal, the
+// one with most detail in `b` (sum of absolute steps between neighbours). Ties: first in reading order.
 ViewRegion MostDifferentRegion(const Image& a, const Image& b, int width, int height);
 
-// A picture for people: a column per image, the last one the reference (ground truth, or the thing compared with).
-// Each column has its caption, the view with the enlarged part framed, that part in whole multiples of its pixels, and
-// the absolute difference to the reference as a heat map (under the reference, its scale). Views of more than 640 x 960
-// are shown smaller, tiny ones larger; the enlarged part shows every original pixel unless a larger one was asked for.
+// A comparison chart with a column per image, the last of which is the reference (ground truth, or the compared image).
+// A column has a caption, the view with the enlarged region framed, that region at an integer zoom, and a heat map of
+// the absolute difference to the reference (for the reference, the colour scale). Views above 640 x 960 are shrunk,
+// tiny ones enlarged; the enlarged region shows every original pixel unless a larger one was requested.
 //
-// Takes 1 or 3 channels, or 4 of which the alpha is ignored; values are clamped to 0–1. kBadArgument: no images,
-// different or empty sizes, a region that is not inside the view, gain or crop out of range.
+// Accepts 1, 3 or 4 channels, ignores alpha, and clamps values to 0–1. kBadArgument: no images, different or empty
+// sizes, a region outside the view, gain or crop out of range.
 Result<Image> SideBySide(std::span<const LabelledImage> images, const SideBySideOptions& options = {});
 
 }  // namespace anchorsplat

@@ -36,8 +36,8 @@ TEST(CaptionText, DrawsInsideOnly) {
   EXPECT_EQ(image.at(1, 1, 2), 0.5f);
   EXPECT_EQ(TextWidth("I", 3), 12);
   EXPECT_EQ(TextWidth("II", 3), 2 * 12 + 3);
-  EXPECT_EQ(FittingText("IIII", TextWidth("III", 2), 2, ""), "III");
-  EXPECT_EQ(FittingText("a long one", TextWidth("a lo...", 1), 1), "a lo...");
+  EXPECT_EQ(TruncatedText("IIII", TextWidth("III", 2), 2, ""), "III");
+  EXPECT_EQ(TruncatedText("a long one", TextWidth("a lo...", 1), 1), "a lo...");
   EXPECT_EQ(TextWidth("", 3), 0);
   // Far outside, and bytes that no glyph stands for.
   DrawText(image, -20, -3, "long text that leaves on the right \x01\xff", 2, {1, 1, 1});

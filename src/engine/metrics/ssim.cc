@@ -18,11 +18,11 @@ namespace anchorsplat::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Local means of these five products of the two pictures are all that SSIM knows about them.
+// SSIM depends on the images only through local means of these five products.
 enum Moment : size_t { kA, kB, kAA, kBB, kAB, kMoments };
 
-// One row of every moment, filtered down the columns but not yet along the row: kSsimRadius zeros (the padding), the
-// row, and zeros up to a whole number of vectors behind the right padding.
+// One row of each moment, filtered vertically but not yet horizontally: kSsimRadius zeros (padding), the row, and zeros
+// up to a whole number of vectors past the right padding.
 struct MomentRows {
   explicit MomentRows(int width)
       : stride(static_cast<size_t>(width) + 2 * kSsimRadius + 64), values(kMoments * stride) {
@@ -34,7 +34,7 @@ struct MomentRows {
   Buffer<float> values;
 };
 
-// Columns [x, x + lanes of d) of row y, all moments.
+// All moments of columns [x, x + Lanes(d)) in row y.
 template <class D>
 void FilterColumns(D d, const SsimRows& rows, const float* weights, int y, int x, MomentRows& out) {
   auto a = hn::Zero(d), b = hn::Zero(d), aa = hn::Zero(d), bb = hn::Zero(d), ab = hn::Zero(d);
@@ -69,7 +69,7 @@ HWY_INLINE hn::Vec<D> FilterRow(D d, const float* row, const float* weights) {
   return sum;
 }
 
-// 1 − SSIM from the five local means. Written so that equal pictures give exactly 0: no fused products.
+// 1 − SSIM from the five local means. Exactly 0 for equal images, hence no fused multiply-add.
 template <class D>
 HWY_INLINE hn::Vec<D> Dissimilarity(D d, hn::Vec<D> a, hn::Vec<D> b, hn::Vec<D> aa, hn::Vec<D> bb, hn::Vec<D> ab) {
   const auto c1 = hn::Set(d, kSsimC1), c2 = hn::Set(d, kSsimC2);
@@ -103,7 +103,7 @@ double SumOfDissimilarityImpl(const SsimRows& rows, const float* weights) {
         if (ignored[x] != 0) values[static_cast<size_t>(x)] = 0;
       }
     }
-    // Fixed lanes, whatever the instruction set's width: eight sums of floats per row, then doubles.
+    // Fixed lanes for any instruction set: eight float sums per row, then doubles.
     float sums[8] = {};
     for (x = 0; x + 8 <= rows.width; x += 8) {
       for (int k = 0; k < 8; ++k) sums[k] += values[static_cast<size_t>(x + k)];

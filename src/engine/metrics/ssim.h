@@ -14,19 +14,18 @@ inline constexpr float kSsimC2 = 0.03f * 0.03f;
 
 const std::array<float, kSsimTaps>& SsimWindow();
 
-// Some rows of one channel of two pictures.
+// Rows of one channel of two images.
 struct SsimRows {
   const float* a;  // [H,W]
   const float* b;  // [H,W]
   int width;       // pixels
-  int height;      // pixels, of the whole channel: rows outside [0, height) count as 0
-  int first;       // the rows [first, last)
+  int height;      // pixels, whole channel; rows outside count as 0
+  int first;       // rows [first, last)
   int last;
-  const uint8_t* ignored = nullptr;  // [H,W] 1: the pixel does not count; null: all count
+  const uint8_t* ignored = nullptr;  // [H,W] 1: ignored; null: none
 };
 
-// Σ (1 − SSIM) over the pixels of the rows that count: small for pictures that are alike, so that floats keep its
-// digits.
+// Σ (1 − SSIM) over the rows' pixels that count. It is small for similar images, so floats keep its precision.
 double SumOfDissimilarity(const SsimRows& rows);
 
 }  // namespace anchorsplat

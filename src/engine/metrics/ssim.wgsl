@@ -1,18 +1,18 @@
-// The loss of photometric_loss.h and its gradient; what is added up and why is in ssim_gradient.h. A workgroup is 16 x 16
-// pixels of one channel, twice: the first kernel has the maps P, Q and R of every window, the second one the gradient of
-// every pixel from the windows that it is under.
+// The loss of photometric_loss.h and its gradient; ssim_gradient.h has the formulas. A workgroup covers 16 x 16 pixels
+// of one channel in two kernels: the first computes the maps P, Q and R of every window, the second sums them into
+// gradients.
 
 struct Loss {
   size: vec2u,      // W, H
   tiles: vec2u,     // of 16 x 16 pixels
-  map: vec4u,       // x0, y0, x1, y1: the pixels whose SSIM counts
-  rendered: vec2u,  // floats from one pixel to the next, from one channel to the next; so the other two
+  map: vec4u,       // x0, y0, x1, y1: pixels whose SSIM counts
+  rendered: vec2u,  // strides in floats: next pixel, next channel; likewise below
   wanted: vec2u,
   gradient: vec2u,
-  channels: vec2u,  // the first, and how many
+  channels: vec2u,  // first, count
   ssim_weight: f32,
   difference_weight: f32,
-  window: array<vec4f, 2>,  // its first half and its middle: it is symmetric
+  window: array<vec4f, 2>,  // first half and centre; it is symmetric
 }
 
 @group(0) @binding(0) var<uniform> loss: Loss;
@@ -24,15 +24,15 @@ struct Loss {
 
 const SIDE = 16u;
 const REACH = 5u;
-const AROUND = 26u;  // a side with what windows reach
+const AROUND = 26u;  // a side plus the reach of windows
 const C1 = 0.0001;
 const C2 = 0.0009;
-const NOT_ASKED = -0.5;  // below: of this pixel nothing is asked
+const IGNORED_BELOW = -0.5;  // pixels with a smaller target are ignored
 
 var<workgroup> pixels: array<vec2f, 676>;    // a, a - b
-var<workgroup> moments: array<vec4f, 416>;   // of 26 rows, along them: a, a - b, (a - b)^2, ab
+var<workgroup> moments: array<vec4f, 416>;   // of 26 rows, filtered along rows: a, a - b, (a - b)^2, ab
 var<workgroup> around: array<f32, 2028>;     // P, Q and R
-var<workgroup> along: array<f32, 1248>;      // the same, along rows
+var<workgroup> along: array<f32, 1248>;      // the same, filtered along rows
 var<workgroup> reduced: array<vec2f, 256>;
 
 fn Weight(tap: u32) -> f32 { return loss.window[tap / 4u][tap % 4u]; }
@@ -50,16 +50,16 @@ fn PlaceOf(number: u32) -> Place {
   return Place(SIDE * vec2u(tile % loss.tiles.x, tile / loss.tiles.x), channel, 3u * (channel * tiles + tile));
 }
 
-// Both pictures there; 0 outside, and equal where nothing is asked.
+// (a, b) of a pixel; 0 outside the image, equal where ignored.
 fn Pair(at: vec2i, channel: u32) -> vec2f {
   if (any(at < vec2i(0)) || any(at >= vec2i(loss.size))) { return vec2f(0.0); }
   let pixel = u32(at.y) * loss.size.x + u32(at.x);
   let a = rendered[pixel * loss.rendered.x + channel * loss.rendered.y];
   let b = wanted[pixel * loss.wanted.x + channel * loss.wanted.y];
-  return vec2f(a, select(b, a, b < NOT_ASKED));
+  return vec2f(a, select(b, a, b < IGNORED_BELOW));
 }
 
-// reduced[0] becomes the sum of all, in a tree that is always the same.
+// Sums all values into reduced[0] in a fixed tree order.
 fn Reduce(lane: u32) {
   workgroupBarrier();
   for (var half = 128u; half > 0u; half /= 2u) {
@@ -140,7 +140,7 @@ fn Reduce(lane: u32) {
   let inside = all(at < loss.size);
   let both = Pair(vec2i(at), place.channel);
   let difference = both.x - both.y;
-  // Not sign(): what is not a number stays none.
+  // Not sign(): NaN must stay NaN.
   var g = select(select(difference, -loss.difference_weight, difference < 0.0), loss.difference_weight, difference > 0.0);
   if (loss.ssim_weight != 0.0) {
     let plane = loss.size.x * loss.size.y;

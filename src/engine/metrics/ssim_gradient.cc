@@ -20,8 +20,8 @@ using Tag = hn::CappedTag<float, 16>;
 using Vector = hn::Vec<Tag>;
 
 constexpr int kTaps = kSsimTaps;
-constexpr int kSlack = 16;  // a register that starts within a row may end behind it
-// Columns of the three kinds of rows, whole registers; column 0 of each is that of the one above plus the radius.
+constexpr int kSlack = 16;  // a register that starts within a row may end past it
+// Columns of the three row types, in whole registers; column 0 of each is that of the previous type plus the radius.
 constexpr int kHalo = 32;
 static_assert(kHalo % kSlack == 0 && kHalo >= 2 * kSsimRadius + kSlack);
 constexpr int kGradientColumns = kSsimStrip + kSlack;
@@ -31,19 +31,19 @@ constexpr int kPixelColumns = kMapColumns + kHalo;
 enum Moment : size_t { kA, kD, kDD, kAB, kMoments };
 enum Map : size_t { kP, kQ, kR, kMaps };
 
-// Everything that is known about a few rows: a window of eleven slides down over the pictures' moments, filtered along
-// their rows, and behind it another one over the maps.
+// Sliding-window state: a window of eleven rows moves down over the images' moments, filtered along rows, followed by
+// another over the maps.
 struct Rows {
   alignas(64) float pixels[kMoments][kPixelColumns];
-  alignas(64) float moments[kMoments][kTaps][kMapColumns];  // row y is at y mod kTaps
+  alignas(64) float moments[kMoments][kTaps][kMapColumns];  // row y at index y mod kTaps
   alignas(64) float maps[kMaps][kMapColumns];
   alignas(64) float filtered[kMaps][kTaps][kGradientColumns];
 };
 
-// The place of row y, which may be a little negative.
+// Index of row y, which may be slightly negative.
 size_t Place(int y) { return static_cast<size_t>((y + 16 * kTaps) % kTaps); }
 
-// Along a row, whose first number is at a multiple of the register's length. The window is symmetric.
+// Filters along a row that starts at a multiple of the register length. The window is symmetric.
 HWY_INLINE Vector FilterAlong(const float* row, const float* weights) {
   const Tag d;
 #if HWY_TARGET == HWY_SCALAR
@@ -51,8 +51,8 @@ HWY_INLINE Vector FilterAlong(const float* row, const float* weights) {
   const Vector t0 = at(0), t1 = at(1), t2 = at(2), t3 = at(3), t4 = at(4), t5 = at(5), t6 = at(6), t7 = at(7),
                t8 = at(8), t9 = at(9), t10 = at(10);
 #else
-  // Nearly every load that does not begin at such a multiple takes two lines of the cache, so there are four of them
-  // and not eleven: what lies in between is put together from two that are four numbers apart.
+  // Nearly every unaligned load touches two cache lines, so there are four instead of eleven: the others are combined
+  // from two that are four numbers apart.
   const Vector t0 = hn::Load(d, row), t4 = hn::LoadU(d, row + 4), t8 = hn::LoadU(d, row + 8),
                t12 = hn::LoadU(d, row + 12);
   const Vector t1 = hn::CombineShiftRightLanes<1>(d, t4, t0), t2 = hn::CombineShiftRightLanes<2>(d, t4, t0),
@@ -69,7 +69,7 @@ HWY_INLINE Vector FilterAlong(const float* row, const float* weights) {
   return hn::MulAdd(hn::Set(d, weights[4]), hn::Add(t4, t6), sum);
 }
 
-// Down the columns, centred on row y.
+// Filters down columns, centred on row y.
 template <int kColumns>
 HWY_INLINE Vector FilterDown(const float (*rows)[kColumns], const size_t* places, int column, const float* weights) {
   const Tag d;
@@ -89,7 +89,7 @@ struct Places {
   size_t at[kTaps];
 };
 
-// Row y of the pictures' moments.
+// Row y of the images' moments.
 void AddPixelRow(const SsimGradientTask& t, const float* weights, int y, Rows& r) {
   const Tag d;
   const int lanes = static_cast<int>(hn::Lanes(d));
@@ -99,7 +99,7 @@ void AddPixelRow(const SsimGradientTask& t, const float* weights, int y, Rows& r
     for (auto& moment : r.moments) std::fill_n(moment[place], columns + lanes, 0.0f);
     return;
   }
-  const int left = t.out.x0 - 2 * kSsimRadius;  // the picture's column of column 0
+  const int left = t.out.x0 - 2 * kSsimRadius;  // image column of column 0
   const int begin = std::max(0, left), end = std::min(t.width, t.out.x1 + 2 * kSsimRadius);
   const float* a = t.a + int64_t{y} * t.width;
   const float* b = t.b + int64_t{y} * t.width;
@@ -121,13 +121,13 @@ void AddPixelRow(const SsimGradientTask& t, const float* weights, int y, Rows& r
   }
 }
 
-// The maps of row y, from the moments of the eleven rows around it. Returns Σ (1 − SSIM) of those within `out`.
+// Maps of row y from the moments of the eleven rows around it. Returns Σ (1 − SSIM) within `out`.
 double AddMapRow(const SsimGradientTask& t, const float* weights, int y, Rows& r) {
   const Tag d;
   const int lanes = static_cast<int>(hn::Lanes(d));
   const size_t place = Place(y);
   const int columns = t.out.x1 - t.out.x0;  // of the gradient
-  const int left = t.out.x0 - kSsimRadius;  // the picture's column of column 0
+  const int left = t.out.x0 - kSsimRadius;  // image column of column 0
   const int begin = std::max(0, t.map.x0 - left), end = std::min(columns + 2 * kSsimRadius, t.map.x1 - left);
   if (y < t.map.y0 || y >= t.map.y1 || begin >= end) {
     for (auto& filtered : r.filtered) std::fill_n(filtered[place], columns + lanes, 0.0f);
@@ -149,7 +149,7 @@ double AddMapRow(const SsimGradientTask& t, const float* weights, int y, Rows& r
     const Vector n2 = hn::MulAdd(two, hn::Sub(ab, mean_ab), c2), e2 = hn::Add(n2, variance);
     const Vector inverse_e1 = hn::Div(one, e1), inverse_e2 = hn::Div(one, e2);
     const Vector similarity1 = hn::Mul(n1, inverse_e1), similarity2 = hn::Mul(n2, inverse_e2);
-    // 1 − SSIM = 1 − (1 − δ²/e₁)(1 − var(d)/e₂): exactly 0 where the pictures are equal.
+    // 1 − SSIM = 1 − (1 − δ²/e₁)(1 − var(d)/e₂): exactly 0 for equal images.
     const Vector off1 = hn::Mul(delta2, inverse_e1), off2 = hn::Mul(variance, inverse_e2);
     const Vector off = hn::NegMulAdd(off1, off2, hn::Add(off1, off2));
     const Vector q = hn::Neg(hn::Mul(hn::Mul(similarity1, similarity2), inverse_e2));
@@ -178,7 +178,7 @@ double AddMapRow(const SsimGradientTask& t, const float* weights, int y, Rows& r
   return static_cast<double>(hn::GetLane(hn::SumOfLanes(d, sum)));
 }
 
-// The gradient's row y, from the maps of the eleven rows around it. Returns Σ |a − b|.
+// Gradient row y from the maps of the eleven rows around it. Returns Σ |a − b|.
 double WriteGradientRow(const SsimGradientTask& t, const float* weights, int y, const Rows& r) {
   const Tag d;
   const int lanes = static_cast<int>(hn::Lanes(d));
@@ -189,7 +189,7 @@ double WriteGradientRow(const SsimGradientTask& t, const float* weights, int y, 
   float* out = t.gradient + start;
   const Vector ssim_weight = hn::Set(d, t.ssim_weight), difference_weight = hn::Set(d, t.difference_weight);
   Vector sum = hn::Zero(d);
-  alignas(64) float last[3][kSlack] = {};  // of the register that would reach behind the row
+  alignas(64) float last[3][kSlack] = {};  // for the register that would reach past the row
   for (int column = 0; column < columns; column += lanes) {
     const bool whole = column + lanes <= columns;
     const size_t rest = static_cast<size_t>(columns - column) * sizeof(float);
@@ -217,7 +217,7 @@ double WriteGradientRow(const SsimGradientTask& t, const float* weights, int y, 
 SsimGradientSums SsimGradientImpl(const SsimGradientTask& t, const float* weights) {
   Rows r;
   SsimGradientSums sums;
-  // Three fronts, each five rows behind the one before.
+  // Three fronts, each five rows after the previous one.
   for (int y = t.out.y0 - 2 * kSsimRadius; y < t.out.y1 + 2 * kSsimRadius; ++y) {
     AddPixelRow(t, weights, y, r);
     const int map_y = y - kSsimRadius;

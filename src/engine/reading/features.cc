@@ -94,7 +94,7 @@ struct Gaussians {
   std::array<Weighted, 4> weighted;            // ln of the axes, opacity; by opacity × area
 };
 
-Gaussians SampleOf(const GaussianCloud& showing) {
+Gaussians SampleStored(const GaussianCloud& showing) {
   Gaussians out;
   const int64_t step = std::max<int64_t>(1, showing.size() / kMostOfStatistics);
   for (int64_t row = 0; row < showing.size(); row += step) {
@@ -478,7 +478,7 @@ Result<SplatFeatures> FeaturesOf(const CloudView& whole, const ShowingGaussians&
     return Error{ErrorCode::kBadArgument, Cat("fewer than ", kLeastGaussians, " visible, small Gaussians")};
   }
   LeaveIfAbandoned();
-  Gaussians sample = SampleOf(showing.all);
+  Gaussians sample = SampleStored(showing.all);
   // √(largest × middle axis) of their 10 % quantiles.
   const double unit = std::exp(0.5 * (sample.weighted[1].Quantile(0.1) + sample.weighted[2].Quantile(0.1)));
   if (!(unit > 0) || !std::isfinite(unit)) {

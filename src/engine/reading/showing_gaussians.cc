@@ -36,7 +36,7 @@ class TellingSearch {
  public:
   explicit TellingSearch(const Framing& framing) : framing_(framing), longest_(LongestOf(framing)) {}
 
-  void Look(const CloudBlock& block) {
+  void Visit(const CloudBlock& block) {
     std::vector<NearestGaussians::Item> near;
     for (size_t i = 0; i < static_cast<size_t>(block.size()); ++i) {
       double distance = 0;
@@ -115,12 +115,12 @@ ShowingStudy::~ShowingStudy() = default;
 
 bool ShowingStudy::done() const { return state_->pass >= 2; }
 
-void ShowingStudy::Look(const CloudBlock& block) {
+void ShowingStudy::Visit(const CloudBlock& block) {
   if (state_->pass == 0) {
-    state_->framing_study->Look(block.first, block.rows);
+    state_->framing_study->Visit(block.first, block.rows);
   } else {
     state_->LookForShowing(block);
-    state_->telling->Look(block);
+    state_->telling->Visit(block);
   }
 }
 

@@ -48,7 +48,7 @@ class ShowingStudy final : public RowStudy {
   explicit ShowingStudy(const CloudBlocks& blocks);
   ~ShowingStudy() override;
   bool done() const override;
-  void Look(const CloudBlock& block) override;
+  void Visit(const CloudBlock& block) override;
   void EndPass() override;
   ShowingGaussians Take();  // once it is done
 

@@ -17,8 +17,8 @@
 #include "core/run_context.h"
 #include "core/spherical_harmonics.h"
 #include "core/statistics.h"
+#include "render/constant_cloud.h"
 #include "render/rasterizer.h"
-#include "render/still_cloud.h"
 
 namespace anchorsplat {
 
@@ -184,7 +184,7 @@ class Painter {
   }
 
   GaussianCloud cloud_;
-  std::optional<StillCloud> still_;  // as `cloud_` is
+  std::optional<ConstantCloud> still_;  // as `cloud_` is
   Buffer<float> colors_;
   CameraSet cameras_;
   double distance_ = 0;

@@ -1,6 +1,5 @@
-// Arithmetic that is as accurate as the CPU's on every driver: WGSL allows exp(−5) 13 ulp, fma two roundings, and has no
-// double. A "wide" number is the sum of two floats, x + y, about 48 bits.
-// Comes after render/view.wgsl, which has Opaque.
+// Arithmetic with the CPU's accuracy on every driver: WGSL allows exp(−5) 13 ulp, fma two roundings, and has no double.
+// A "wide" number is the sum of two floats, x + y, about 48 bits. Appended to render/view.wgsl, which defines Opaque.
 
 // x finite and below 88; relative error below 2e-7, 0 where the result is not a normal number (Cephes, expf).
 fn Exp(x: f32) -> f32 {
@@ -78,7 +77,7 @@ fn DifferenceOfProducts(a: f32, b: f32, c: f32, d: f32) -> f32 {
   return Opaque(first.x - second.x) + (first.y - second.y);
 }
 
-// Bits of |x|: they sort like it, with infinities and NaN behind all numbers. Compilers may assume that there are none,
-// but not of whole numbers.
+// Bits of |x|: they sort like |x|, with infinities and NaN after all numbers. Compilers may assume that floats are
+// finite, but not integers.
 fn Magnitude(x: f32) -> u32 { return bitcast<u32>(x) & 0x7fffffffu; }
 const INFINITE = 0x7f800000u;

@@ -1,5 +1,5 @@
-// log2 α of a Gaussian at a pixel, (dx, dy) from the mean. Both directions must decide alike about every pixel: here alone
-// it is calculated, by operations that no compiler puts together in more than one way.
+// log2 α of a Gaussian at a pixel, (dx, dy) from the mean. Forward and backward must agree on every pixel, so it is
+// computed only here, with operations that compilers cannot reassociate.
 fn Log2Alpha(shape: vec4f, dx: f32, dy: f32) -> f32 {  // u_xx, u_xy, u_yy, log2_opacity
   let u = fma(shape.x, dx, shape.y * dy);
   let v = shape.z * dy;

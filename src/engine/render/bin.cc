@@ -13,11 +13,11 @@ namespace anchorsplat {
 
 namespace {
 
-// Smaller rectangles are listed whole: blending drops a tile that the ellipse misses faster than it is found here. The
-// few larger ones are cut so that a long needle across the image is not listed for all of it.
+// Smaller rectangles are listed whole: blending skips a tile outside the ellipse faster than it is found here. Larger
+// ones, which are few, are cut so that a long needle is not listed for the whole image.
 constexpr int kWorthCutting = 64;  // tiles
 
-// Columns [x0, x1) of one row of tiles that the ellipse α = min_alpha meets.
+// Columns [x0, x1) of a row of tiles that intersect the ellipse α = min_alpha.
 class EllipseRows {
  public:
   EllipseRows(const ProjectedGaussian& g, double log2_min_alpha)
@@ -33,7 +33,7 @@ class EllipseRows {
   }
 
   std::pair<int, int> Columns(int tile_y, int x0, int x1) const {
-    // Pixel centres of the row, and a margin for the floats that blending calculates with.
+    // Pixel centres of the row, with a margin for blending's float arithmetic.
     const double margin = 0.01 + 1e-6 * (std::abs(x_) + std::abs(y_));
     const double top = std::max(tile_y * kTile + 0.5 - margin - y_, -height_);
     const double bottom = std::min(tile_y * kTile + kTile - 0.5 + margin - y_, height_);
@@ -57,7 +57,7 @@ class EllipseRows {
   double x_, y_, reach2_, u_yy_, half_, shear_, height_, rightmost_;
 };
 
-// Calls row(tile_y, x0, x1) for every row of tiles of the k-th Gaussian within tile rows [first_row, last_row).
+// Calls row(tile_y, x0, x1) for each row of tiles of the k-th Gaussian within tile rows [first_row, last_row).
 template <typename Row>
 void VisitRows(const BinParams& p, double log2_min_alpha, int64_t k, int first_row, int last_row, Row&& row) {
   const TileRect rect = p.tiles_by_depth[k];
@@ -73,12 +73,12 @@ void VisitRows(const BinParams& p, double log2_min_alpha, int64_t k, int first_r
   }
 }
 
-// Most Gaussians of a splat seen as a whole lie on at most 2 × 2 tiles. Those take one way without branches, which a
-// processor cannot guess: the four tiles of a square, of which some are the first one again and do not count.
+// In views of a whole splat, most Gaussians cover at most 2 × 2 tiles. They take one branch-free path, as branches
+// would be mispredicted: the four tiles of a square, of which duplicates of the first do not count.
 struct UpToFour {
   explicit UpToFour(const TileRect& rect) : two_x(rect.x1 - rect.x0 - 1u), two_y(rect.y1 - rect.y0 - 1u) {}
   bool fits() const { return (two_x | two_y) <= 1; }
-  uint32_t two_x, two_y;  // 1 where there is a second column (row)
+  uint32_t two_x, two_y;  // 1 if there is a second column (row)
 };
 
 }  // namespace
@@ -90,7 +90,7 @@ void CountPairs(const BinParams& p) {
     uint32_t* counts = p.chunk_counts + c * tiles;
     std::fill_n(counts, tiles, 0u);
     const auto [first, last] = PieceOf(p.count, p.chunks, c);
-    // Fetched in a loop of its own, which waits for many cache misses at a time.
+    // Fetched in a separate loop, so that many cache misses overlap.
     for (int64_t k = first; k < last; ++k) p.tiles_by_depth[k] = p.tiles[p.order[k]];
     for (int64_t k = first; k < last; ++k) {
       const TileRect rect = p.tiles_by_depth[k];
@@ -109,8 +109,8 @@ void CountPairs(const BinParams& p) {
       });
     }
   });
-  // Offsets of the tiles; the counts become each chunk's place within its tile: earlier chunks are nearer.
-  // This is done by one thread, so it goes along the chunks.
+  // Tile offsets; counts become each chunk's position within its tile (earlier chunks are nearer). Single-threaded, so
+  // it iterates along chunks.
   std::fill_n(p.tile_offsets, tiles + 1, int64_t{0});
   for (int64_t c = 0; c < p.chunks; ++c) {
     uint32_t* counts = p.chunk_counts + c * tiles;
@@ -130,11 +130,11 @@ void ListPairs(const BinParams& p, int64_t first_tile, int64_t last_tile, int32_
   const int first_row = static_cast<int>(first_tile / p.tiles_x);
   const int last_row = static_cast<int>((last_tile - 1) / p.tiles_x) + 1;
   ParallelFor(0, p.chunks, 1, [&](int64_t c, int64_t) {
-    uint32_t* next = p.chunk_counts + c * tiles;  // within the tile; from here on, within the run
+    uint32_t* next = p.chunk_counts + c * tiles;  // within the tile; from here on within the run
     for (int64_t t = first_tile; t < last_tile; ++t) next[t] += static_cast<uint32_t>(p.tile_offsets[t] - base);
     const auto [first, last] = PieceOf(p.count, p.chunks, c);
     const bool all_tiles = first_tile == 0 && last_tile == tiles;
-    // Where a tile that does not count is written to, again and again.
+    // Dummy destination of tiles that do not count.
     uint32_t spare = static_cast<uint32_t>(p.tile_offsets[last_tile] - base + c);
     for (int64_t k = first; k < last; ++k) {
       const int32_t i = p.order[k];

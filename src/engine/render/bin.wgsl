@@ -1,8 +1,8 @@
-// The tiles of every visible Gaussian: counted per tile and per Gaussian, then listed. The twin of render/bin.cc.
+// Tiles of every visible Gaussian: counted per tile and per Gaussian, then listed. Counterpart of render/bin.cc.
 //
-// There is one kernel for all of it, so that what is counted and what is listed is the same arithmetic: two pipelines
-// may round the edge of an ellipse differently. The CPU cuts large rectangles in double. Here the ellipse is taken a
-// hair larger instead, so now and then a tile is listed that the CPU leaves out; no pixel of it is reached.
+// One kernel does all, so that counting and listing use the same arithmetic: two pipelines may round an ellipse's edge
+// differently. The CPU cuts large rectangles in double. Here the ellipse is slightly enlarged instead, so sometimes a
+// tile is listed that the CPU omits; none of its pixels is reached.
 
 struct Bin {
   tiles_x: u32,
@@ -12,8 +12,8 @@ struct Bin {
   log2_min_alpha: f32,
   tiles: u32,                       // of the picture
 }
-const COUNT_TILES = 0u;  // tiles to tile_counts, a Gaussian's pairs to places
-const COUNT_PAIRS = 1u;  // a Gaussian's pairs to places
+const COUNT_TILES = 0u;  // writes tiles to tile_counts, and a Gaussian's pairs to places
+const COUNT_PAIRS = 1u;  // writes a Gaussian's pairs to places
 const LIST_PAIRS = 2u;   // from the scanned places to keys and pairs
 
 @group(0) @binding(0) var<uniform> bin: Bin;
@@ -21,7 +21,7 @@ const LIST_PAIRS = 2u;   // from the scanned places to keys and pairs
 @group(0) @binding(2) var<storage, read> order: array<u32>;
 @group(0) @binding(3) var<storage, read> rects: array<vec2u>;
 @group(0) @binding(4) var<storage, read> seen: array<Seen>;
-@group(0) @binding(5) var<storage, read_write> tile_counts: array<atomic<u32>>;  // [T+1], the last one of what is cut
+@group(0) @binding(5) var<storage, read_write> tile_counts: array<atomic<u32>>;  // [T+1], the last counts cut tiles
 @group(0) @binding(6) var<storage, read_write> places: array<u32>;
 @group(0) @binding(7) var<storage, read_write> keys: array<u32>;   // tile within the run
 @group(0) @binding(8) var<storage, read_write> pairs: array<u32>;  // row
@@ -29,10 +29,10 @@ const LIST_PAIRS = 2u;   // from the scanned places to keys and pairs
 const TILE = 16.0;
 const WORTH_CUTTING = 64u;  // tiles
 
-// What EllipseRows of render/bin.cc keeps: where α ≥ min_alpha, at height dy, dx ∈ shear·dy ± half·sqrt(reach² − v²).
+// As EllipseRows of render/bin.cc: α ≥ min_alpha at height dy for dx ∈ shear·dy ± half·sqrt(reach² − v²).
 struct Ellipse {
   x: f32, y: f32, reach2: f32, u_yy: f32, half: f32, shear: f32, height: f32, rightmost: f32,
-  beyond: bool,  // of what floats hold: no row of its rectangle is cut
+  beyond: bool,  // out of float range: no row of the rectangle is cut
 }
 
 fn EllipseOf(row: u32) -> Ellipse {
@@ -47,7 +47,8 @@ fn EllipseOf(row: u32) -> Ellipse {
   e.half = 1.0 / u.x;
   e.shear = -u.y * e.half;
   e.height = sqrt(e.reach2) / u.z;
-  // Height of the rightmost point; the leftmost one is opposite. Divided by the larger of both, whose square overflows.
+  // Height of the rightmost point; the leftmost one is opposite. Divided by the larger of both, as the square may
+  // overflow.
   let slope = e.half * u.z;
   let larger = max(abs(e.shear), slope);
   let a = e.shear / larger;
@@ -61,7 +62,7 @@ fn Edge(e: Ellipse, dy: f32, side: f32) -> f32 {
   return e.x + e.shear * dy + side * e.half * sqrt(max(0.0, e.reach2 - v * v));
 }
 
-// Columns [x, y) of a row of tiles that the ellipse meets, within those of its rectangle.
+// Columns [x, y) of a row of tiles that intersect the ellipse, within its rectangle.
 fn Columns(e: Ellipse, tile_y: u32, columns: vec2u) -> vec2u {
   if (e.beyond) { return columns; }
   let margin = 0.01 + 1e-6 * (abs(e.x) + abs(e.y));
@@ -106,7 +107,7 @@ fn visit_tiles(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_in
     }
   }
   if (bin.step != LIST_PAIRS) { places[place] = at; }
-  // At least a 32nd of the tiles that the rectangle has and the list has not: a sum that does not overflow.
+  // At least 1/32 of the tiles in the rectangle but not in the list: a sum that does not overflow.
   if (cut && bin.step == COUNT_TILES) {
     let left_out = (columns.y - columns.x) * (rows.y - rows.x) - at;
     atomicAdd(&tile_counts[bin.tiles], (left_out + 31u) / 32u);

@@ -23,11 +23,11 @@ namespace {
 
 constexpr size_t kBatch = 256;
 
-// A tile at work: the batch and its pixels.
+// State of a tile: the batch and its pixels.
 struct Tile : TileBatch<kBatch> {
   bool finished[kBlocks];  // no pixel of the block can change any more
 
-  // `passed` keeps shrinking after a pixel stopped, `transmittance` keeps its value; see BlendLanes.
+  // `passed` keeps shrinking after a pixel stopped, `transmittance` does not; see BlendLanes.
   alignas(64) float passed[kBlocks][kPixels], transmittance[kBlocks][kPixels];
   alignas(64) float color[3][kBlocks][kPixels], weighted_depth[kBlocks][kPixels], weights[kBlocks][kPixels];
   alignas(64) int32_t contributors[kBlocks][kPixels];
@@ -37,8 +37,8 @@ struct Limits {
   float log2_min_alpha, max_alpha, min_transmittance;
 };
 
-// Composites a block's list onto as many of its pixels as a register holds, from pixel `first` on. Returns whether all
-// of them are finished. `place` is the batch's first place in the tile's list.
+// Composites a block's list onto a register of its pixels, from pixel `first` on. Returns whether all of them are
+// finished. `place`: index of the batch in the tile's list.
 template <bool kDepth, bool kContributors>
 HWY_INLINE bool BlendLanes(const Limits& limits, size_t block, size_t first, int32_t place, Tile& t) {
   const D d;
@@ -68,8 +68,8 @@ HWY_INLINE bool BlendLanes(const Limits& limits, size_t block, size_t first, int
     const V alpha = hn::Min(Exp2(log2_alpha), max_alpha);
     const V weight = hn::Mul(alpha, passed);
     const V next = hn::NegMulAdd(passed, alpha, passed);
-    // A pixel stops at the first `next` that is too small. `passed` takes that step nevertheless and stays too small
-    // ever after, which spares a mask of stopped pixels and keeps the chain from one Gaussian to the next short.
+    // A pixel stops at the first `next` that is too small. `passed` takes that step nevertheless and stays too small,
+    // which avoids a mask of stopped pixels and keeps the dependency chain between Gaussians short.
     passed = hn::IfThenElse(seen, next, passed);
     const M open = hn::Gt(passed, min_transmittance);
     const M added = hn::And(seen, open);
@@ -116,13 +116,13 @@ void BlendBlocks(const Limits& limits, int32_t place, Tile& t) {
   }
 }
 
-// Pixels outside the image start as stopped: they hold nothing up and are never stored.
+// Pixels outside the image start as stopped; they delay nothing and are never stored.
 void StartTile(int columns, int rows, Tile& t) {
   for (size_t block = 0; block < kBlocks; ++block) {
     const int x = static_cast<int>(block % kBlocksPerSide) * kBlock;
     const int y = static_cast<int>(block / kBlocksPerSide) * kBlock;
     t.finished[block] = x >= columns || y >= rows;
-    if (x + kBlock <= columns && y + kBlock <= rows) {  // nearly all
+    if (x + kBlock <= columns && y + kBlock <= rows) {  // nearly always
       std::fill_n(t.passed[block], kPixels, 1.0f);
       continue;
     }
@@ -138,7 +138,7 @@ void StartTile(int columns, int rows, Tile& t) {
   std::fill_n(&t.contributors[0][0], kBlocks * kPixels, 0);
 }
 
-// Background, alpha and expected depth, in place: color, passed := alpha, weighted_depth := depth.
+// Adds the background and computes alpha and expected depth, in place: color, passed := alpha, weighted_depth := depth.
 void FinishPixels(const BlendParams& p, Tile& t) {
   const D d;
   const size_t lanes = hn::Lanes(d);
@@ -149,7 +149,7 @@ void FinishPixels(const BlendParams& p, Tile& t) {
       hn::Store(hn::MulAdd(transmittance, hn::Set(d, p.background[c]), hn::Load(d, color)), d, color);
     }
     hn::Store(hn::Sub(hn::Set(d, 1.0f), transmittance), d, &t.passed[0][0] + i);
-    // By the sum of the weights: it is 1 − T, which as a difference has few digits where little was seen.
+    // Divided by the sum of weights, which equals 1 − T but keeps precision where little is visible.
     const V weights = hn::Load(d, &t.weights[0][0] + i);
     const M covered = hn::Gt(weights, hn::Zero(d));
     float* depth = &t.weighted_depth[0][0] + i;
@@ -158,7 +158,7 @@ void FinishPixels(const BlendParams& p, Tile& t) {
   }
 }
 
-// Blocks to rows of the image.
+// Stores blocks to rows of the image.
 template <typename T>
 void StorePlane(const T (*blocks)[kPixels], int width, int columns, int rows, T* out) {
   for (int y = 0; y < rows; ++y) {
@@ -173,7 +173,7 @@ void StorePlane(const T (*blocks)[kPixels], int width, int columns, int rows, T*
 
 template <typename T>
 void FillPlane(T value, int width, int columns, int rows, T* out) {
-  if (columns == kTile) {  // of a length known when compiling: a few stores instead of a call
+  if (columns == kTile) {  // compile-time length: a few stores instead of a call
     for (int y = 0; y < rows; ++y) {
       for (int x = 0; x < kTile; ++x) out[int64_t{y} * width + x] = value;
     }

@@ -1,6 +1,6 @@
-// Front-to-back compositing of a run of tiles, a workgroup for each and a thread for each pixel: the twin of
-// render/blend.cc. Of View, `counts` are: pixels of a plane of `picture`, first tile and number of tiles of this
-// dispatch, first row of pixels that `picture` and `kept` hold.
+// Front-to-back compositing of a run of tiles, with a workgroup per tile and a thread per pixel: counterpart of
+// render/blend.cc. View.counts: pixels per plane of `picture`, first tile and number of tiles of this dispatch, first
+// pixel row in `picture` and `kept`.
 
 @group(0) @binding(1) var<storage, read> seen: array<Seen>;
 @group(0) @binding(2) var<storage, read> ranges: array<u32>;
@@ -71,7 +71,7 @@ fn blend(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) l
   picture[to + plane] = rgb.y;
   picture[to + 2u * plane] = rgb.z;
   picture[to + 3u * plane] = 1.0 - transmittance;
-  // By the sum of the weights: 1 − T has few digits where little was seen.
+  // Divided by the sum of weights, as 1 − T is imprecise where little is visible.
   picture[to + 4u * plane] = select(0.0, rgb_depth.w / max(weights, 1e-37), weights > 0.0);
   kept[to] = vec2u(bitcast<u32>(transmittance), contributors);
 }

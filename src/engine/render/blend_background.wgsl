@@ -1,15 +1,15 @@
-// Σ T·∂L/∂C over the pixels of each tile, which is the background's gradient. Compiled behind view.wgsl.
+// Σ T·∂L/∂C over the pixels of each tile: the background's gradient. Appended to view.wgsl.
 
 struct BlendBackground {
-  size: vec4u,  // width in pixels; tiles_x; first tile and how many of this dispatch
-  box: vec4u,   // x0, y0, x1, y1 of the pixels that have a gradient, half-open; nothing outside is read
-  first_row: u32,  // of pixels that `upstream` holds
+  size: vec4u,  // width in pixels; tiles_x; first tile and tile count of this dispatch
+  box: vec4u,   // x0, y0, x1, y1 of pixels with a gradient, half-open; nothing outside is read
+  first_row: u32,  // first pixel row in `upstream`
 }
 
 @group(0) @binding(0) var<uniform> job: BlendBackground;
 @group(0) @binding(1) var<storage, read> kept: array<vec2u>;
-@group(0) @binding(2) var<storage, read> upstream: array<vec4f>;  // row by row of the box: ∂L/∂C, ∂L/∂A
-@group(0) @binding(3) var<storage, read_write> backgrounds: array<vec4f>;  // rgb of every tile of the picture
+@group(0) @binding(2) var<storage, read> upstream: array<vec4f>;  // row-major in the box: ∂L/∂C, ∂L/∂A
+@group(0) @binding(3) var<storage, read_write> backgrounds: array<vec4f>;  // rgb per tile of the picture
 
 var<workgroup> sums: array<vec4f, 256>;
 

@@ -22,45 +22,45 @@ namespace HWY_NAMESPACE {
 namespace {
 
 constexpr size_t kBatch = 128;
-constexpr size_t kGroup = 32;      // Gaussians of a block between the two steps of AddBlock
-constexpr size_t kSumsAhead = 16;  // Gaussians whose sums are fetched before they are added to
+constexpr size_t kGroup = 32;      // Gaussians of a block per group, between the two steps of AddBlock
+constexpr size_t kSumsAhead = 16;  // prefetch distance of sums, in Gaussians
 constexpr size_t kSums = 16;       // floats per Gaussian of a batch: one sum per feature
 
-// The sums over a block's pixels are a small matrix product: per Gaussian and pixel there are two numbers, q and the
-// weight w = α·T, and every pixel has features that do not depend on the Gaussian. Even ones are multiplied by q: 1, x,
-// y, x², xy, y² about the middle of the tile; odd ones by w: ∂L/∂C. As q and w lie side by side in memory, one
+// The sums over a block's pixels are a small matrix product. Each (Gaussian, pixel) has two factors, q and the weight w
+// = α·T, and each pixel has features independent of the Gaussian: even ones, multiplied by q, are 1, x, y, x², xy, y²
+// about the middle of the tile; odd ones, multiplied by w, are ∂L/∂C. q and w are adjacent in memory, so one
 // instruction fills a register with both.
 enum Feature : size_t { kOne = 0, kX = 2, kY = 4, kXX = 6, kXY = 8, kYY = 10, kRed = 1, kGreen = 3, kBlue = 5 };
 
-// A tile at work: the batch, its sums, and its pixels, block by block.
+// State of a tile: the batch, its sums, and its pixels by block.
 struct Tile : TileBatch<kBatch> {
-  bool finished[kBlocks];  // nothing is left to do: no gradient, or all Gaussians of the batch lie behind
+  bool finished[kBlocks];  // no gradient, or all Gaussians of the batch lie behind
 
-  alignas(64) float features[kBlocks][kPixels][kSums];  // of the pixels in the order of StorePairs
+  alignas(64) float features[kBlocks][kPixels][kSums];  // of pixels in the order of StorePairs
   size_t order[kPixels];
   alignas(64) float sums[kBatch + 3][kSums];
   bool touched[kBatch];  // the Gaussian has sums
 
   alignas(64) float color_gradient[3][kBlocks][kPixels];
-  alignas(64) float transmittance[kBlocks][kPixels];  // T behind the Gaussian that is next
+  alignas(64) float transmittance[kBlocks][kPixels];  // T behind the next Gaussian
   alignas(64) float behind[kBlocks][kPixels];         // S of BlendBackwardParams
   alignas(64) int32_t contributors[kBlocks][kPixels];
-  int32_t last[kBlocks];  // the largest of its contributors, 0 where no pixel has a gradient
+  int32_t last[kBlocks];  // largest of its contributors, 0 if no pixel has a gradient
 
-  // Of a group: q and w of every pixel in turn, whose they are and whether they are not all 0. Behind the group, three
-  // Gaussians with sums of their own that nobody reads.
+  // Per group: q and w of every pixel alternating, the Gaussian's index, and whether they are not all 0. Three dummy
+  // Gaussians follow the group, whose sums are not read.
   alignas(64) float factors[kGroup + 3][2 * kPixels];
   size_t members[kGroup + 3];
   bool added[kGroup];
 
-  // Only where the absolute sums are wanted: of |∂L/∂mean2d|/(2 ln 2), x and y, over the pixels of each lane.
+  // Only for absolute sums: of |∂L/∂mean2d|/(2 ln 2), x and y, over the pixels of each lane.
   alignas(64) float absolute[kBatch][2][kLanesAtMost];
 };
 
 constexpr float kMiddle = 0.5f * kTile;
 
-// Two numbers per pixel, side by side. The pixels of a register come out in another order, see PixelOrder; which one
-// does not matter, and to restore theirs would cost more shuffles.
+// Stores two numbers per pixel side by side. This permutes the pixels of a register (see PixelOrder), which does not
+// matter and would cost shuffles to undo.
 HWY_INLINE void StorePairs(V first, V second, float* to) {
   const D d;
 #if HWY_TARGET == HWY_SCALAR
@@ -72,7 +72,7 @@ HWY_INLINE void StorePairs(V first, V second, float* to) {
 #endif
 }
 
-// order[k] is the pixel whose numbers StorePairs puts at place k.
+// order[k]: the pixel whose numbers StorePairs puts at index k.
 void PixelOrder(size_t* order) {
   const D d;
   const size_t lanes = hn::Lanes(d);
@@ -84,7 +84,7 @@ void PixelOrder(size_t* order) {
   }
 }
 
-// What is the same for all tiles.
+// Tile-independent data.
 void Prepare(Tile& t) {
   PixelOrder(t.order);
   for (size_t k = 0; k < 3; ++k) {
@@ -109,7 +109,7 @@ void Prepare(Tile& t) {
   }
 }
 
-// A register of a pair of floats again and again.
+// A register filled with a repeated pair of floats.
 HWY_INLINE V RepeatPair(const float* pair) {
   const D d;
 #if HWY_TARGET == HWY_SCALAR
@@ -127,7 +127,7 @@ HWY_INLINE void AddSums(size_t block, const uint8_t* four, Tile& t) {
   const size_t lanes = hn::Lanes(d);
   const size_t k0 = four[0], k1 = four[1], k2 = four[2], k3 = four[3];
   for (size_t f = 0; f < kSums; f += lanes) {
-    const size_t odd = lanes == 1 ? f % 2 : 0;  // a register of one lane takes its half of the pair only
+    const size_t odd = lanes == 1 ? f % 2 : 0;  // a one-lane register takes only its half of the pair
     const float *factors0 = t.factors[k0] + odd, *factors1 = t.factors[k1] + odd, *factors2 = t.factors[k2] + odd,
                 *factors3 = t.factors[k3] + odd;
     V sum0 = hn::Zero(d), sum1 = hn::Zero(d), sum2 = hn::Zero(d), sum3 = hn::Zero(d);
@@ -151,8 +151,8 @@ struct Limits {
   float log2_min_alpha, max_alpha;
 };
 
-// The factors of the group's `count` Gaussians, from the farthest on, at as many of the block's pixels as a register
-// holds, from pixel `first` on. Says for each one whether a pixel added it.
+// Computes the factors of the group's `count` Gaussians, farthest first, for a register of the block's pixels from
+// `first` on. Returns for each whether a pixel added it.
 template <bool kAbsolute>
 HWY_INLINE void EvaluateLanes(const Limits& limits, size_t block, size_t first, size_t count, int32_t place, Tile& t) {
   const D d;
@@ -177,13 +177,13 @@ HWY_INLINE void EvaluateLanes(const Limits& limits, size_t block, size_t first, 
     const M added = hn::And(hn::Ge(log2_alpha, log2_min_alpha), hn::RebindMask(d, hn::Gt(contributors, own_place)));
     float* factors = t.factors[k] + 2 * first;
     if (hn::AllFalse(d, added)) {
-      if (hn::Lanes(d) < kPixels) std::fill_n(factors, 2 * hn::Lanes(d), 0.0f);  // the other pixels may have added it
+      if (hn::Lanes(d) < kPixels) std::fill_n(factors, 2 * hn::Lanes(d), 0.0f);  // other pixels may have added it
       continue;
     }
     t.added[k] = true;
     const V uncapped = Exp2(log2_alpha);
     const V alpha = hn::IfThenElseZero(added, hn::Min(uncapped, max_alpha));
-    const V inverse = hn::Div(one, hn::Sub(one, alpha));  // 1 where nothing was added
+    const V inverse = hn::Div(one, hn::Sub(one, alpha));  // 1 if nothing was added
     transmittance = hn::Mul(transmittance, inverse);
     const V weight = hn::Mul(alpha, transmittance);
     const V along = hn::MulAdd(red, hn::Set(d, t.seen[j][0]),
@@ -191,10 +191,10 @@ HWY_INLINE void EvaluateLanes(const Limits& limits, size_t block, size_t first, 
     const V own = hn::Mul(weight, along);
     const V q = hn::NegMulAdd(behind, hn::Mul(alpha, inverse), own);
     behind = hn::Add(behind, own);
-    const V free_q = hn::IfThenElseZero(hn::Le(uncapped, max_alpha), q);  // and 0 where nothing was added
+    const V free_q = hn::IfThenElseZero(hn::Le(uncapped, max_alpha), q);  // also 0 if nothing was added
     StorePairs(free_q, weight, factors);
     if constexpr (kAbsolute) {
-      // ∂L/∂mean2d = 2 ln 2·Wᵀ q·(u, v) as in ProjectBackwardCpu, but of every pixel by itself.
+      // ∂L/∂mean2d = 2 ln 2·Wᵀ q·(u, v) as in ProjectBackwardCpu, but per pixel.
       const V u_xx = hn::Set(d, t.shape[j][0]), u_xy = hn::Set(d, t.shape[j][1]), u_yy = hn::Set(d, t.shape[j][2]);
       const V u = hn::MulAdd(u_xx, dx, hn::Mul(u_xy, dy)), v = hn::Mul(u_yy, dy);
       const V along_x = hn::Mul(free_q, hn::Mul(u_xx, u));
@@ -208,8 +208,7 @@ HWY_INLINE void EvaluateLanes(const Limits& limits, size_t block, size_t first, 
   hn::Store(behind, d, t.behind[block] + first);
 }
 
-// Goes through a block's list from behind, in groups: first what every pixel contributes, then the sums over the
-// pixels.
+// Processes a block's list from the back in groups: first the contributions per pixel, then the sums over pixels.
 template <bool kAbsolute>
 void AddBlock(const Limits& limits, size_t block, int32_t place, Tile& t) {
   const int32_t* list = t.lists[block];
@@ -230,7 +229,7 @@ void AddBlock(const Limits& limits, size_t block, int32_t place, Tile& t) {
       t.touched[t.members[k]] |= t.added[k];
     }
     if (found > 0) {
-      // The three behind the group fill the last four up.
+      // The three dummies complete the last four.
       for (size_t k = 0; k < 3; ++k) group[found + k] = static_cast<uint8_t>(kGroup + k);
       for (size_t k = 0; k < found; k += 4) AddSums(block, group + k, t);
     }
@@ -238,7 +237,7 @@ void AddBlock(const Limits& limits, size_t block, int32_t place, Tile& t) {
   }
 }
 
-// Rows of the image to blocks; what lies outside of [x0, x1) × [y0, y1) of the tile becomes `outside`.
+// Loads rows of the image into blocks; outside of [x0, x1) × [y0, y1) of the tile becomes `outside`.
 template <typename T>
 void LoadPlane(const T* plane, int width, int x0, int y0, int x1, int y1, T outside, T (*blocks)[kPixels]) {
   if (x0 > 0 || y0 > 0 || x1 < kTile || y1 < kTile) std::fill_n(&blocks[0][0], kBlocks * kPixels, outside);
@@ -256,7 +255,7 @@ void LoadPlane(const T* plane, int width, int x0, int y0, int x1, int y1, T outs
   }
 }
 
-// What follows from a block's pixels.
+// Values derived from a block's pixels.
 HWY_INLINE void StartBlock(const BlendBackwardParams& p, size_t block, double* background_gradient, Tile& t) {
   const D d;
   const DI di;
@@ -294,9 +293,9 @@ HWY_INLINE void StartBlock(const BlendBackwardParams& p, size_t block, double* b
   }
 }
 
-// Loads the pixels and adds the background's gradient. Returns 1 + the last place of the tile's list that matters.
+// Loads the pixels and adds the background's gradient. Returns 1 + the last relevant index of the tile's list.
 int32_t StartTile(const BlendBackwardParams& p, int tile_x, int tile_y, double* background_gradient, Tile& t) {
-  // Pixels outside of the image or the box have no gradient, which makes everything 0.
+  // Pixels outside the image or box have gradient 0, which makes everything 0.
   const int x0 = std::max(0, p.box.x0 - tile_x), x1 = std::min(kTile, p.box.x1 - tile_x);
   const int y0 = std::max(0, p.box.y0 - tile_y), y1 = std::min(kTile, p.box.y1 - tile_y);
   const int64_t plane = int64_t{p.width} * p.height;
@@ -319,13 +318,13 @@ int32_t StartTile(const BlendBackwardParams& p, int tile_x, int tile_y, double* 
   return last_of_tile;
 }
 
-// From the sums about the middle of the tile to those of BlendGradient.
+// Converts sums about the middle of the tile to those of BlendGradient.
 HWY_INLINE void Whiten(const Tile& t, size_t j, BlendGradient& to) {
   const float* s = t.sums[j];
   const float xx = t.shape[j][0], xy = t.shape[j][1], yy = t.shape[j][2];
   const float dx = kMiddle - t.at[j][0], dy = kMiddle - t.at[j][1];
-  // The middle's own u and v. Where a pixel adds the Gaussian, u and v are at most 2.9; a tile is 16 px wide and the
-  // factors at most 1.6 per pixel: all terms are small numbers, even if the mean is far away.
+  // u and v of the middle. Where a pixel adds the Gaussian, u and v are at most 2.9; a tile is 16 px wide and the
+  // factors at most 1.6 per pixel. So all terms are small even if the mean is far away.
   const float u = xx * dx + xy * dy, v = yy * dy;
   // Sums of q times the offset from the middle, in u and v.
   const float ou = xx * s[kX] + xy * s[kY], ov = yy * s[kY];
@@ -343,7 +342,7 @@ HWY_INLINE void Whiten(const Tile& t, size_t j, BlendGradient& to) {
   to.rgb[2] = s[kBlue];
 }
 
-// The absolute sums of Gaussian j of the batch to `to` [2].
+// Stores the absolute sums of Gaussian j of the batch to `to` [2].
 HWY_INLINE void WriteAbsolute(const Tile& t, size_t j, float* to) {
   constexpr float kTwoLn2 = 1.38629436f;
   for (size_t a = 0; a < 2; ++a) {
@@ -355,10 +354,10 @@ HWY_INLINE void WriteAbsolute(const Tile& t, size_t j, float* to) {
 
 HWY_INLINE void FetchSums(const BlendGradient* to) {
   hwy::Prefetch(&to->q);
-  hwy::Prefetch(&to->rgb[2]);  // most lie in two lines of the cache
+  hwy::Prefetch(&to->rgb[2]);  // most span two cache lines
 }
 
-// What the batch has found is added to the Gaussians' own sums.
+// Adds the batch's sums to the Gaussians'.
 template <bool kAbsolute>
 HWY_INLINE void AddToGradients(const BlendBackwardParams& p, const int32_t* rows, size_t n, const Tile& t) {
   for (size_t j = 0; j < std::min(n, kSumsAhead); ++j) hwy::Prefetch(p.gradients + rows[j]);
@@ -376,7 +375,7 @@ HWY_INLINE void AddToGradients(const BlendBackwardParams& p, const int32_t* rows
   }
 }
 
-// What the batch has found, to the slots of its Gaussians in this tile.
+// Stores the batch's sums in the slots of its Gaussians for this tile.
 template <bool kAbsolute>
 HWY_INLINE void WriteSlots(const BlendBackwardParams& p, const int32_t* rows, size_t n, int64_t tile, const Tile& t) {
   const int32_t tile_x = static_cast<int32_t>(tile % p.tiles_x), tile_y = static_cast<int32_t>(tile / p.tiles_x);
@@ -456,7 +455,7 @@ HWY_EXPORT(BackwardRange);
 void BlendBackwardCpu(const BlendBackwardParams& p) {
   const int64_t tiles = p.last_tile - p.first_tile;
   const int64_t pairs = p.tile_offsets[p.last_tile] - p.tile_offsets[p.first_tile];
-  // All in one task where they share the gradients.
+  // One task if they share the gradients.
   const int64_t tiles_per_task = p.gradients != nullptr ? tiles : TilesPerTask(tiles, pairs);
   ParallelFor(p.first_tile, p.last_tile, tiles_per_task, [&p](int64_t first, int64_t last) {
     HWY_DYNAMIC_DISPATCH(BackwardRange)(p, first, last);

@@ -1,21 +1,21 @@
-// The twin of blend_backward.cc, which has the formulas. Compiled behind view.wgsl, alpha.wgsl and, as constants, whether the absolute
-// sums are wanted (ABSOLUTE), how many Gaussians go from one barrier to the next (GROUP), how many numbers a thread finds
-// about each (VALUES), and how many sums a slot has (SUMS).
+// Counterpart of blend_backward.cc, which has the formulas. Appended to view.wgsl, alpha.wgsl and constants: whether
+// absolute sums are computed (ABSOLUTE), Gaussians between barriers (GROUP), numbers per thread and Gaussian (VALUES),
+// and sums per slot (SUMS).
 //
-// A workgroup is a tile, a thread four pixels side by side. Group by group, the farthest first:
-//   1. every thread adds up what its pixels contribute to each Gaussian: six numbers, about the point of the tile that is
-//      nearest to the mean, where sums have the size of their terms;
-//   2. every thread adds those of GROUP threads for one Gaussian and turns them to the sums of BlendGradient, which is
-//      linear, while the next group is put into its place;
-//   3. what is left of each sum is added and written to the Gaussian's slot.
-// So there are two barriers a group, all of workgroup memory is used from one to the next, and no order ever changes.
+// A workgroup is a tile, a thread four adjacent pixels. Group by group, farthest first:
+//   1. every thread sums its pixels' contributions to each Gaussian: six numbers, about the point of the tile nearest to
+//      the mean, where sums have the magnitude of their terms;
+//   2. every thread adds those of GROUP threads for one Gaussian and converts them, linearly, to the sums of
+//      BlendGradient, while the next group is loaded;
+//   3. the partial sums are added and written to the Gaussian's slot.
+// This needs two barriers per group, uses all of workgroup memory, and has a fixed order.
 
 struct BlendBackward {
   background: vec4f,
   size: vec4u,   // width, height in pixels; tiles_x; first tile of the run
-  box: vec4u,    // x0, y0, x1, y1 of the pixels that have a gradient, half-open; nothing outside is read
-  run: vec4u,    // tiles of the run; first tile that `ranges` knows; slots; where the sums of scan.wgsl lie in `starts`
-  first_row: u32,  // of pixels that `upstream` holds
+  box: vec4u,    // x0, y0, x1, y1 of pixels with a gradient, half-open; nothing outside is read
+  run: vec4u,    // tiles of the run; first tile in `ranges`; slots; offset of scan.wgsl's sums in `starts`
+  first_row: u32,  // first pixel row in `upstream`
   unused: u32,
   cuts: vec2f,   // log2(min_alpha), max_alpha
 }
@@ -25,24 +25,24 @@ struct BlendBackward {
 @group(0) @binding(2) var<storage, read> ranges: array<u32>;
 @group(0) @binding(3) var<storage, read> pairs: array<u32>;
 @group(0) @binding(4) var<storage, read> kept: array<vec2u>;
-@group(0) @binding(5) var<storage, read> upstream: array<vec4f>;  // row by row of the box: ∂L/∂C, ∂L/∂A
+@group(0) @binding(5) var<storage, read> upstream: array<vec4f>;  // row-major in the box: ∂L/∂C, ∂L/∂A
 @group(0) @binding(6) var<storage, read> rects: array<vec2u>;
 @group(0) @binding(7) var<storage, read> starts: array<u32>;  // see gather_slots.wgsl
 @group(0) @binding(8) var<storage, read_write> slots: array<f32>;
 
 const THREADS = 64u;
-const PARTS = THREADS / GROUP;            // threads that share a Gaussian in the second step
-const STRIDE = VALUES * THREADS + PARTS;  // of a Gaussian; the odd end keeps its threads out of each other's banks
+const PARTS = THREADS / GROUP;            // threads per Gaussian in the second step
+const STRIDE = VALUES * THREADS + PARTS;  // per Gaussian; odd, to avoid bank conflicts
 const TILE = 16.0;
 const TWO_LN2 = 1.3862943611198906;
 
 var<workgroup> found: array<f32, GROUP * STRIDE>;
 var<workgroup> parts: array<f32, THREADS * SUMS>;
-// Two groups: the one at work and the next.
+// Two groups: the current and the next.
 var<workgroup> shapes: array<vec4f, 2 * GROUP>;  // u_xx, u_xy, u_yy, log2_opacity
 var<workgroup> colors: array<vec3f, 2 * GROUP>;
 var<workgroup> places: array<vec2f, 2 * GROUP>;  // px from the tile's corner
-var<workgroup> members: array<u32, 2 * GROUP>;   // their slots
+var<workgroup> members: array<u32, 2 * GROUP>;   // slots
 var<workgroup> deepest: atomic<u32>;
 
 struct Member {
@@ -52,7 +52,7 @@ struct Member {
   slot: u32,
 }
 
-// The Gaussian at a place of the tile's list.
+// The Gaussian at an index of the tile's list.
 fn Fetch(pair: u32, tile: vec2u) -> Member {
   let row = pairs[pair];
   let g = seen[row];
@@ -77,7 +77,7 @@ fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation
   let tile = vec2u(tile_number % job.size.z, tile_number / job.size.z);
   let first = ranges[tile_number - job.run.y];
 
-  // Pixels outside of the box have no gradient, which makes everything 0.
+  // Pixels outside the box have gradient 0, which makes everything 0.
   let column = 4u * (thread % 4u);
   let corner = 16u * tile + vec2u(column, thread / 4u);
   var red = vec4f(0.0);
@@ -109,11 +109,11 @@ fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation
 
   let x = vec4f(0.5, 1.5, 2.5, 3.5) + f32(column);
   let y = f32(thread / 4u) + 0.5;
-  // Of the second step: whose sums, and which of the threads of the first.
+  // In the second step: whose sums, and which of the first step's threads.
   let member = thread / PARTS;
   let part = thread % PARTS;
 
-  var room = 0u;  // of the groups' room: 0 or GROUP
+  var room = 0u;  // half of the groups' memory in use: 0 or GROUP
   var end = (last + GROUP - 1u) / GROUP * GROUP;
   if (thread < GROUP && end > 0u && end - GROUP + thread < last) { Place(Fetch(first + end - GROUP + thread, tile), thread); }
   workgroupBarrier();
@@ -142,19 +142,19 @@ fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation
         let color = colors[room + j];
         let uncapped = vec4f(Exp2(log2_alpha.x), Exp2(log2_alpha.y), Exp2(log2_alpha.z), Exp2(log2_alpha.w));
         let alpha = select(vec4f(0.0), min(uncapped, vec4f(job.cuts.y)), added);
-        let inverse = 1.0 / (1.0 - alpha);  // 1 where nothing was added
+        let inverse = 1.0 / (1.0 - alpha);  // 1 if nothing was added
         transmittance *= inverse;
         let weight = alpha * transmittance;
         let own = weight * (red * color.x + (green * color.y + blue * color.z));
         let free = added & (uncapped <= vec4f(job.cuts.y));
         q = select(vec4f(0.0), own - behind * (alpha * inverse), free);
         behind += own;
-        // A gradient that is not finite spoils only what its pixel adds.
+        // A non-finite gradient affects only what its pixel adds.
         r = select(vec4f(0.0), weight * red, added);
         g = select(vec4f(0.0), weight * green, added);
         b = select(vec4f(0.0), weight * blue, added);
         if (ABSOLUTE) {
-          // ∂L/∂mean2d = 2 ln 2·Wᵀ q·(u, v) as in project_backward.wgsl, but of every pixel by itself.
+          // ∂L/∂mean2d = 2 ln 2·Wᵀ q·(u, v) as in project_backward.wgsl, but per pixel.
           let u = shape.x * dx + shape.y * dy;
           let v = shape.z * dy;
           along_x = abs(q * (shape.x * u));
@@ -203,7 +203,7 @@ fn blend_backward(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation
         absolute += vec2f(found[at + (VALUES - 2u) * THREADS], found[at + (VALUES - 1u) * THREADS]);
       }
     }
-    // To the sums of BlendGradient (Whiten in blend_backward.cc). (u, v) is the near point's own.
+    // Converts to the sums of BlendGradient (Whiten in blend_backward.cc). (u, v) is that of the near point.
     let shape = shapes[room + member];
     let from_mean = near - mean;
     let u = shape.x * from_mean.x + shape.y * from_mean.y;

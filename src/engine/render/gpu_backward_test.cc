@@ -424,7 +424,7 @@ TEST_F(GpuBackwardFaults, WhatIsSeenEqualsTheCpu) {
   Rasterizer on_cpu, on_gpu;
   RenderOutput output;
   ASSERT_TRUE(on_cpu.Render(cloud_, camera_, options, output).ok());
-  const Result<SeenGradient> expected = on_cpu.BackwardToSeen(cloud_, weights_);
+  const Result<AppearanceGradient> expected = on_cpu.BackwardToAppearance(cloud_, weights_);
   ASSERT_TRUE(expected.ok());
   int64_t taught = 0;
   const auto compare = [&](const GpuFaults& faults) {
@@ -433,7 +433,7 @@ TEST_F(GpuBackwardFaults, WhatIsSeenEqualsTheCpu) {
     const ScopedGpuForTest scope(device);
     ASSERT_TRUE(on_gpu.Render(cloud_, camera_, options, output).ok());
     const int calls = device->calls();
-    const Result<SeenGradient> seen = on_gpu.BackwardToSeen(cloud_, weights_);
+    const Result<AppearanceGradient> seen = on_gpu.BackwardToAppearance(cloud_, weights_);
     ASSERT_TRUE(seen.ok()) << seen.error().message;
     EXPECT_GT(device->calls(), calls);
     EXPECT_EQ(WhyGpuWasGivenUp().empty(), faults.calls < 0);

@@ -8,16 +8,16 @@ namespace anchorsplat {
 
 namespace {
 
-// Of a block that is streamed: 15 MiB of degree 3, long enough to keep a GPU busy, but a small part of the cloud.
+// Bytes of a streamed block: 15 MiB at degree 3, enough to keep a GPU busy, but a small part of the cloud.
 constexpr int64_t kStreamedRows = int64_t{1} << 16, kStreamedBlocks = 8;
-constexpr int64_t kRowsAtMost = int64_t{1} << 22;  // of a block; its offsets in bytes stay far below 2^32
+constexpr int64_t kRowsAtMost = int64_t{1} << 22;  // per block; keeps byte offsets far below 2^32
 
-// Rows of a block at most: its largest column fits a binding.
+// Maximum rows of a block: its largest column must fit a binding.
 int64_t RowsPerBlock(const GpuAdapter& adapter, int sh_degree) {
   const int64_t row = std::max<int64_t>(16, int64_t{12} * ShCoefficients(sh_degree));  // bytes
   const uint64_t largest = std::min(adapter.max_binding, adapter.max_buffer);
   const int64_t rows = static_cast<int64_t>(std::min<uint64_t>(largest, uint64_t{1} << 40)) / row;
-  return std::clamp<int64_t>(rows / kGpuGroup * kGpuGroup, kGpuGroup, kRowsAtMost);
+  return std::clamp<int64_t>(rows / kGpuWorkgroupSize * kGpuWorkgroupSize, kGpuWorkgroupSize, kRowsAtMost);
 }
 
 template <typename T>
@@ -77,7 +77,7 @@ void GpuCloud::Write(GpuDevice& device, const CloudView& view) const {
 Status GpuCloud::Assign(GpuDevice& device, const CloudView& view) {
   const int64_t count = view.size();
   if (!copy_ || blocks_.empty() || count_ != count || sh_degree_ != view.sh_degree) {
-    *this = GpuCloud();  // before the new memory is asked for
+    *this = GpuCloud();  // free before the new allocation
     if (Result<GpuCloud> made = Create(device, count, view.sh_degree); made.ok()) {
       *this = std::move(made).value();
     } else {
@@ -94,7 +94,7 @@ Status GpuCloud::Assign(GpuDevice& device, const CloudView& view) {
 Status GpuCloud::Stream(GpuDevice& device) {
   const CloudView view = host_;
   *this = GpuCloud();
-  const int64_t part = (view.size() / kStreamedBlocks / kGpuGroup + 1) * kGpuGroup;
+  const int64_t part = (view.size() / kStreamedBlocks / kGpuWorkgroupSize + 1) * kGpuWorkgroupSize;
   const int64_t rows = std::min({view.size(), part, kStreamedRows, RowsPerBlock(device.adapter(), view.sh_degree)});
   Result<GpuCloudBlock> block = MakeBlock(device, 0, rows, view.sh_degree);
   if (!block.ok()) return block.error();

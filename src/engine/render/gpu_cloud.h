@@ -10,8 +10,8 @@
 
 namespace anchorsplat {
 
-// The columns of a splat on a GPU, in blocks of rows that each fit a binding. Shapes and units are those of
-// GaussianCloud; a row of `sh` has 3·(sh_degree+1)² floats.
+// Columns of a splat on a GPU, in blocks of rows that each fit a binding. Shapes and units as in GaussianCloud; a row
+// of `sh` has 3·(sh_degree+1)² floats.
 struct GpuCloudBlock {
   int64_t first = 0, count = 0;  // rows
   GpuMemory means;               // f32 [count,3]
@@ -21,18 +21,17 @@ struct GpuCloudBlock {
   GpuMemory sh;                  // f32 [count,K,3]
 };
 
-// A splat that stays on the GPU (Create), so that a fit need not upload it for every picture, or a copy of one in host
-// memory (Assign) for one picture. A copy that does not fit is streamed: there is memory for one block, which is
-// uploaded when it is asked for.
+// A splat on the GPU: resident (Create), so that a fit need not upload it for every picture, or a copy of one in host
+// memory (Assign). A copy that does not fit is streamed: it has memory for one block, uploaded on demand.
 class GpuCloud {
  public:
   GpuCloud() = default;
 
-  // Resident, all values 0. Errors: of GpuDevice::Allocate.
+  // A resident cloud of zeros. Errors: those of GpuDevice::Allocate.
   static Result<GpuCloud> Create(GpuDevice& device, int64_t count, int sh_degree);
 
-  // Becomes a copy of `view`, whose arrays must stay as they are until the next Assign or Drop. Memory of before is
-  // used again where the shapes are the same. Errors: not even room for a block.
+  // Makes this a copy of `view`, whose arrays must not change until the next Assign or Drop. Reuses memory if shapes
+  // match. Errors: no room for even one block.
   Status Assign(GpuDevice& device, const CloudView& view);
 
   int64_t size() const { return count_; }
@@ -41,20 +40,20 @@ class GpuCloud {
   bool resident() const { return resident_; }
   bool empty() const { return blocks_.empty(); }
 
-  // The rows of all blocks, in order, from 0 to size().
+  // Number of blocks, which cover rows 0 to size() in order.
   size_t block_count() const;
-  // Valid until the next call: a streamed cloud uploads the block to where the last one was.
+  // Valid until the next call, as a streamed cloud has memory for one block.
   const GpuCloudBlock& Block(GpuDevice& device, size_t k);
-  // Of a resident cloud.
+  // Only for a resident cloud.
   std::span<const GpuCloudBlock> blocks() const { return blocks_; }
 
-  // Writes all of `view` to a resident cloud of the same shape.
+  // Overwrites a resident cloud of the same shape with `view`.
   void Write(GpuDevice& device, const CloudView& view) const;
-  // Some rows in host memory, in that order. Errors: of GpuDevice::Read.
+  // Reads `rows`, in that order, into host memory. Errors: those of GpuDevice::Read.
   Result<GaussianCloud> ReadRows(GpuDevice& device, std::span<const int64_t> rows) const;
 
-  // What a copy can do where memory is needed for other things: to be streamed from here on, or to give all of it back.
-  // What a fit works on exists nowhere else and cannot.
+  // Frees memory for other uses: a copy can switch to streaming or drop everything. A resident cloud cannot, as it
+  // exists nowhere else.
   bool can_stream() const { return copy_ && resident_ && !blocks_.empty(); }
   Status Stream(GpuDevice& device);
   bool can_drop() const { return copy_ && !blocks_.empty(); }
@@ -69,7 +68,7 @@ class GpuCloud {
   bool resident_ = true, copy_ = false;
   int64_t rows_per_block_ = 0;
   std::vector<GpuCloudBlock> blocks_;  // all, or the one that is streamed through
-  CloudView host_;                     // of a copy
+  CloudView host_;                     // source of a copy
 };
 
 }  // namespace anchorsplat

@@ -5,8 +5,7 @@
 
 namespace anchorsplat {
 
-// What kernels and host share, laid out as WGSL does. The structs are those of render/view.wgsl, which says what is in
-// them.
+// Structs shared by kernels and host, laid out as in WGSL; render/view.wgsl describes their members.
 
 struct GpuView {
   float r[3][4], r_low[3][4];
@@ -28,26 +27,26 @@ struct GpuSeen {
 };
 static_assert(sizeof(GpuSeen) == 64 && std::is_trivially_copyable_v<GpuSeen>);
 
-// Buffers of a picture of N Gaussians, T = tiles_x·tiles_y tiles and P pixels:
-//   seen     Seen[N]     rows of culled Gaussians hold anything
+// Buffers of a picture with N Gaussians, T = tiles_x·tiles_y tiles and P pixels:
+//   seen     Seen[N]     undefined for culled Gaussians
 //   rects    vec2u[N]    tiles of a Gaussian, half-open: x0 | y0 << 16, x1 | y1 << 16; (0, 0) = culled
 //   radii    vec2i[N]    px, as the profile defines them; 0 = culled by its rules
 //   order    u32[M]      rows of the visible Gaussians by depth
 //   sizes    u32[16]     see GpuSize
-//   ranges   u32[R+1]    of a run of R tiles: first pair of each tile within the run, and how many pairs there are
+//   ranges   u32[R+1]    for a run of R tiles: first pair of each tile within the run, and the number of pairs
 //   pairs    u32[…]      rows, by tile and depth
-//   picture  f32[5,P]    red, green, blue, alpha, expected depth (0 where not asked for), plane by plane
-//   kept     vec2u[P]    bits of T; 1 + place in the tile's list of the last Gaussian added, 0 for none
+//   picture  f32[5,P]    red, green, blue, alpha, expected depth (0 unless requested), planar
+//   kept     vec2u[P]    bits of T; 1 + index in the tile's list of the last Gaussian added, 0 for none
 enum GpuSize : uint32_t {
   kSizeVisible = 0,    // M
-  kSizePairs = 1,      // of the run that is listed
+  kSizePairs = 1,      // of the listed run
   kSizeGaussians = 2,  // N
 };
 
-// What render/bin.wgsl does with the tiles of a run.
+// Mode of render/bin.wgsl.
 enum class GpuBinStep : uint32_t { kCountTiles = 0, kCountPairs = 1, kListPairs = 2 };
 
-// Items of a block of the sorts and scans.
+// Items per block of sorts and scans.
 inline constexpr uint32_t kGpuBlock = 2048;
 
 }  // namespace anchorsplat

@@ -29,8 +29,8 @@ struct BinParameters {
   uint32_t tiles, unused;
 };
 
-constexpr uint64_t kPixelBytes = 20;       // of `picture`
-constexpr int64_t kFewestPairs = 1 << 16;  // a run of fewer is not worth the dispatches
+constexpr uint64_t kPixelBytes = 20;       // bytes per pixel of `picture`
+constexpr int64_t kFewestPairs = 1 << 16;  // smaller runs are not worth the dispatches
 
 template <typename T>
 std::span<std::byte> Bytes(T* values, size_t count) {
@@ -39,30 +39,30 @@ std::span<std::byte> Bytes(T* values, size_t count) {
 
 }  // namespace
 
-// All but the pairs.
+// All buffers except pairs.
 Status GpuRasterizer::MakeRoom(bool whole_picture) {
   const auto n = static_cast<uint64_t>(count), tiles = static_cast<uint64_t>(tile_count);
-  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, seen, n * sizeof(GpuSeen), "projected Gaussians"));
-  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, rects, n * 8, "tiles of Gaussians"));
-  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, radii, n * 8, "radii of Gaussians"));
+  ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device, seen, n * sizeof(GpuSeen), "projected Gaussians"));
+  ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device, rects, n * 8, "tiles of Gaussians"));
+  ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device, radii, n * 8, "radii of Gaussians"));
   for (size_t k = 0; k < 2; ++k) {
-    ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, keys[k], n * 4, "depths of Gaussians"));
-    ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, rows[k], n * 4, "the order of Gaussians"));
+    ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device, keys[k], n * 4, "depths of Gaussians"));
+    ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device, rows[k], n * 4, "the order of Gaussians"));
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, unusual, n * 4 + 4, "unusual Gaussians"));
-  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, places, GpuScanBytes(n), "the places of Gaussians"));
-  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, tables, GpuSortTableBytes(n), "tables of a sort"));
-  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, sizes, 64, "sizes"));
-  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, totals, 64, "totals"));
-  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, tile_counts, tiles * 4 + 4, "counts of tiles"));
-  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, ranges, tiles * 4 + 4, "ranges of tiles"));
+  ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device, unusual, n * 4 + 4, "unusual Gaussians"));
+  ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device, places, GpuScanBytes(n), "the places of Gaussians"));
+  ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device, tables, GpuSortTableBytes(n), "tables of a sort"));
+  ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device, sizes, 64, "sizes"));
+  ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device, totals, 64, "totals"));
+  ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device, tile_counts, tiles * 4 + 4, "counts of tiles"));
+  ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device, ranges, tiles * 4 + 4, "ranges of tiles"));
 
-  // A picture that does not fit is made in bands, unless all of it is wanted there.
+  // A picture that does not fit is drawn in bands, unless it must stay on the GPU.
   const uint64_t tile_row_pixels = uint64_t{view.size[0]} * kTile;
   const auto room_for_band = [&]() -> Status {
     const uint64_t pixels = static_cast<uint64_t>(tile_rows_per_band) * tile_row_pixels;
-    ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, kept, pixels * 8, "pixels"));
-    return GpuRoom(*device, picture, pixels * kPixelBytes, "pixels");
+    ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device, kept, pixels * 8, "pixels"));
+    return EnsureGpuMemory(*device, picture, pixels * kPixelBytes, "pixels");
   };
   tile_rows_per_band = view.size[3];
   Status room = room_for_band();
@@ -73,17 +73,17 @@ Status GpuRasterizer::MakeRoom(bool whole_picture) {
   return room;
 }
 
-// `order` of the visible Gaussians, and the pairs of every tile.
+// Computes `order` and the pairs of every tile.
 void GpuRasterizer::SortAndCount() {
   const auto n = static_cast<uint32_t>(count);
   device->Write(*sizes, 4 * kSizeGaussians, std::as_bytes(std::span(&n, 1)));
   const VisibleParameters parameters = {n, n, {}};
-  device->Run(kMarkVisible, AsParameters(parameters), {{1, rects.get()}, {2, places.get()}}, GpuGroups(n));
+  device->Run(kMarkVisible, AsParameters(parameters), {{1, rects.get()}, {2, places.get()}}, GpuWorkgroups(n));
   ScanOnGpu(*device, {*sizes, kSizeGaussians, *places, *totals, n});
   device->Copy(*totals, 4 * kSizeGaussians, *sizes, 4 * kSizeVisible, 4);
   device->Run(kListVisible, AsParameters(parameters),
               {{1, rects.get()}, {3, places.get()}, {4, seen.get()}, {5, keys[0].get()}, {6, rows[0].get()}},
-              GpuGroups(n));
+              GpuWorkgroups(n));
   SortOnGpu(*device, {*sizes,
                       kSizeVisible,
                       {keys[0].get(), keys[1].get()},
@@ -91,7 +91,7 @@ void GpuRasterizer::SortAndCount() {
                       *tables,
                       *totals,
                       n,
-                      32});  // eight passes: ends in rows[0]
+                      32});  // eight passes end in rows[0]
   device->Clear(*tile_counts, 0, 4 * static_cast<uint64_t>(tile_count) + 4);
   VisitTiles(0, tile_count, GpuBinStep::kCountTiles, n);
   counts_are_of_all = true;
@@ -113,7 +113,7 @@ Status GpuRasterizer::ReadCounts() {
   return {};
 }
 
-// What other pictures have left behind, so that there is room for this one.
+// Frees memory of other pictures to make room for this one.
 void GpuRasterizer::DropSpare() {
   for (size_t k = 0; k < 2; ++k) pairs[k].reset(), pair_keys[k].reset();
   pair_capacity = 0;
@@ -123,8 +123,8 @@ void GpuRasterizer::DropSpare() {
 Status GpuRasterizer::RoomForPairs(int64_t wanted) {
   const uint64_t bytes = 4 * static_cast<uint64_t>(wanted);
   for (size_t k = 0; k < 2; ++k) {
-    ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, pairs[k], bytes, "pairs of tiles and Gaussians"));
-    ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, pair_keys[k], bytes, "pairs of tiles and Gaussians"));
+    ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device, pairs[k], bytes, "pairs of tiles and Gaussians"));
+    ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device, pair_keys[k], bytes, "pairs of tiles and Gaussians"));
   }
   pair_capacity = static_cast<int64_t>(
       std::min({pairs[0]->bytes(), pairs[1]->bytes(), pair_keys[0]->bytes(), pair_keys[1]->bytes()}) / 4);
@@ -145,13 +145,14 @@ Status GpuRasterizer::MakeRoomForPairs(GpuCloud& cloud, int64_t max_pairs) {
     Status room = RoomForPairs(wanted);
     if (room.ok()) {
       run_pairs = std::max(longest, std::min(max_pairs, pair_capacity));
-      room = GpuRoom(*device, tables, GpuSortTableBytes(static_cast<uint64_t>(std::min(run_pairs, total_pairs))),
-                     "tables of a sort");
+      room =
+          EnsureGpuMemory(*device, tables, GpuSortTableBytes(static_cast<uint64_t>(std::min(run_pairs, total_pairs))),
+                          "tables of a sort");
     }
     if (room.ok()) return {};
     DropSpare();
     if (cloud.can_drop()) {
-      cloud.Drop();  // it has been projected
+      cloud.Drop();  // already projected
     } else if (wanted > fewest) {
       wanted = std::max(fewest, wanted / 2);
     } else {
@@ -169,7 +170,7 @@ void GpuRasterizer::VisitTiles(int64_t first, int64_t last, GpuBinStep step, uin
                                     .log2_min_alpha = view.cuts[1],
                                     .tiles = static_cast<uint32_t>(tile_count),
                                     .unused = 0};
-  // What only counts writes no pairs.
+  // Counting writes no pairs.
   const bool lists = step == GpuBinStep::kListPairs;
   device->Run(kVisitTiles, AsParameters(parameters),
               {{1, sizes.get()},
@@ -180,7 +181,7 @@ void GpuRasterizer::VisitTiles(int64_t first, int64_t last, GpuBinStep step, uin
                {6, places.get()},
                {7, lists ? pair_keys[0].get() : keys[1].get()},
                {8, lists ? pairs[0].get() : rows[1].get()}},
-              GpuGroups(at_most));
+              GpuWorkgroups(at_most));
 }
 
 int64_t GpuRasterizer::EndOfRun(int64_t first, int64_t end) const {
@@ -217,7 +218,7 @@ void GpuRasterizer::ListRun(int64_t first, int64_t last) {
                                static_cast<int>(std::bit_width(static_cast<uint64_t>(last - first - 1)))});
 }
 
-// Tiles [first, last) of a band of tile rows.
+// Blends tiles [first, last) of a band of tile rows.
 void GpuRasterizer::Blend(int64_t first, int64_t last, int64_t band_row) {
   GpuView run = view;
   run.counts[0] = static_cast<uint32_t>(PlanePixels());

@@ -18,7 +18,7 @@ namespace anchorsplat {
 
 namespace {
 
-// Of blend_backward.wgsl: all of workgroup memory is used, and the absolute sums need more of it per Gaussian.
+// Group size of blend_backward.wgsl: uses all workgroup memory, and absolute sums need more per Gaussian.
 constexpr std::string_view kPlainSums =
     "const ABSOLUTE = false;\nconst GROUP = 8u;\nconst VALUES = 6u;\nconst SUMS = 9u;\n";
 constexpr std::string_view kAbsoluteSums =
@@ -53,12 +53,12 @@ struct GatherParameters {
   uint32_t size[4], more[4];
 };
 
-constexpr int64_t kSlotBytes = 52;                  // whether it is touched, and twelve numbers
-constexpr int64_t kSlotAlignment = 64;              // so that the numbers begin at a multiple of 256 bytes
-constexpr int64_t kFewestSlots = int64_t{1} << 10;  // less memory is not tried
-constexpr int64_t kRowsAtOnce = int64_t{1} << 18;   // of a GpuGradient: 64 MiB of degree 3
-constexpr int64_t kShRows = 64;                     // Gaussians of a workgroup of the spherical harmonics
-static_assert(kRowsAtOnce % kGpuGroup == 0 && kGpuGroup % kShRows == 0);
+constexpr int64_t kSlotBytes = 52;                  // a touched flag and twelve numbers
+constexpr int64_t kSlotAlignment = 64;              // aligns the numbers to 256 bytes
+constexpr int64_t kFewestSlots = int64_t{1} << 10;  // lower limit of attempts
+constexpr int64_t kRowsAtOnce = int64_t{1} << 18;   // rows of a GpuGradient: 64 MiB at degree 3
+constexpr int64_t kShRows = 64;                     // Gaussians per workgroup of the SH stage
+static_assert(kRowsAtOnce % kGpuWorkgroupSize == 0 && kGpuWorkgroupSize % kShRows == 0);
 
 uint32_t Word(int64_t value) { return static_cast<uint32_t>(value); }
 
@@ -66,10 +66,11 @@ uint64_t LargestBinding(const GpuDevice& device) {
   return std::min({device.adapter().max_binding, device.adapter().max_buffer, uint64_t{1} << 40});
 }
 
-// Of a gradient with this many Gaussians' rows.
+// Bytes of a gradient with this many rows.
 Status MakeRoom(const GpuRasterizer& rasterizer, int64_t rows, int64_t sh_stride, bool absolute, GpuGradient& g) {
   const auto room = [&](GpuMemory& memory, int64_t floats) {
-    return GpuRoom(*rasterizer.device, memory, static_cast<uint64_t>(4 * floats * rows), "the gradient of a splat");
+    return EnsureGpuMemory(*rasterizer.device, memory, static_cast<uint64_t>(4 * floats * rows),
+                           "the gradient of a splat");
   };
   ANCHORSPLAT_RETURN_IF_ERROR(room(g.means, 3));
   ANCHORSPLAT_RETURN_IF_ERROR(room(g.log_scales, 3));
@@ -104,38 +105,38 @@ BlendGradient FromGpu(const std::array<float, 12>& sums) {
   return {sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], {sums[6], sums[7], sums[8]}};
 }
 
-// A run of tiles whose slots are there at once.
+// A run of tiles whose slots are allocated at once.
 struct GpuRasterizerBackward::Run {
   int64_t first, last;      // tiles
   int64_t listed_first;     // tile of ranges[0]
-  int64_t slots = 0;        // of the run, rounded up
-  bool first_sums = false;  // no run before it
+  int64_t slots = 0;        // in the run, rounded up
+  bool first_sums = false;  // the first run
   PixelBox box;
   const GpuBuffer* pixels = nullptr;
-  int64_t pixel_row = 0;  // of the picture, the first that `pixels` holds
+  int64_t pixel_row = 0;  // first row of the picture in `pixels`
 };
 
 Status GpuRasterizerBackward::MakeRoomForSums() {
   GpuRasterizer& r = *rasterizer_;
   const auto n = static_cast<uint64_t>(r.count);
-  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*r.device, sums_, 48 * n, "what pixels say of the Gaussians"));
-  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*r.device, starts_, GpuScanBytes(n), "the places of sums"));
-  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*r.device, lengths_, 64, "the length of a scan"));
-  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*r.device, totals_, 64, "the total of a scan"));
-  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*r.device, many_, 4, "the total of a scan"));
-  ANCHORSPLAT_RETURN_IF_ERROR(
-      GpuRoom(*r.device, backgrounds_, static_cast<uint64_t>(16 * r.tile_count), "the gradient of the background"));
+  ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*r.device, sums_, 48 * n, "what pixels say of the Gaussians"));
+  ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*r.device, starts_, GpuScanBytes(n), "the places of sums"));
+  ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*r.device, lengths_, 64, "the length of a scan"));
+  ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*r.device, totals_, 64, "the total of a scan"));
+  ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*r.device, many_, 4, "the total of a scan"));
+  ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*r.device, backgrounds_, static_cast<uint64_t>(16 * r.tile_count),
+                                              "the gradient of the background"));
   const std::array<uint32_t, 1> length = {Word(r.count)};
   r.device->Write(*lengths_, 4 * kSizeGaussians, std::as_bytes(std::span(length)));
   return {};
 }
 
-// Rows [first_row, last_row) of the picture, as far as the box goes.
+// Uploads rows [first_row, last_row) of the picture, clipped to the box.
 Status GpuRasterizerBackward::Upload(const RenderGradient& gradient, int first_row, int last_row) {
   const PixelBox& box = gradient.box;
   const int64_t across = box.x1 - box.x0, rows = last_row - first_row;
   const size_t floats = static_cast<size_t>(4 * across * rows);
-  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*rasterizer_->device, pixels_, 4 * floats, "the gradient of a picture"));
+  ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*rasterizer_->device, pixels_, 4 * floats, "the gradient of a picture"));
   if (staging_.size() < floats) staging_.resize(floats);
   const int64_t width = gradient.color.width, plane = gradient.color.plane();
   const float* color = gradient.color.pixels.data();
@@ -160,20 +161,20 @@ void GpuRasterizerBackward::CountSlots(const Run& run) {
   const GatherParameters parameters = {{Word(r.count), r.view.size[2], Word(run.first), Word(run.last)}, {}};
   r.device->Clear(*many_, 0, 4);
   r.device->Run(kCountSlots, AsParameters(parameters), {{1, r.rects.get()}, {2, starts_.get()}, {7, many_.get()}},
-                GpuGroups(static_cast<uint64_t>(r.count)));
+                GpuWorkgroups(static_cast<uint64_t>(r.count)));
   ScanOnGpu(*r.device, {*lengths_, kSizeGaussians, *starts_, *totals_, static_cast<uint64_t>(r.count)});
 }
 
-// Shortens the run until its slots are there: at most kMaxGpuSlots, and what the device gives.
+// Shortens the run until its slots fit: at most kMaxGpuSlots and what the device can allocate.
 Status GpuRasterizerBackward::PlaceSlots(Run& run) {
   GpuRasterizer& r = *rasterizer_;
   const auto room = [&](int64_t slots) {
     run.slots = (std::max<int64_t>(slots, 1) + kSlotAlignment - 1) / kSlotAlignment * kSlotAlignment;
-    return GpuRoom(*r.device, slots_, static_cast<uint64_t>(kSlotBytes * run.slots), "the sums of tiles");
+    return EnsureGpuMemory(*r.device, slots_, static_cast<uint64_t>(kSlotBytes * run.slots), "the sums of tiles");
   };
   const auto fit = static_cast<int64_t>(LargestBinding(*r.device) / kSlotBytes);
   int64_t most = std::min(kMaxGpuSlots, fit / kSlotAlignment * kSlotAlignment);
-  // Nearly always there is room for all of them, and then nobody has to wait for how many there are.
+  // Almost always all fit, and then no wait for their number is needed.
   if (r.most_tiles <= most && room(r.most_tiles).ok()) {
     CountSlots(run);
     return {};
@@ -185,8 +186,7 @@ Status GpuRasterizerBackward::PlaceSlots(Run& run) {
         {{totals_.get(), 4 * uint64_t{kSizeGaussians}, std::as_writable_bytes(std::span(&total, 1))},
          {many_.get(), 0, std::as_writable_bytes(std::span(&many, 1))}}};
     ANCHORSPLAT_RETURN_IF_ERROR(r.device->Read(reads));
-    const int64_t slots =
-        std::max(int64_t{total}, 32 * int64_t{many});  // where the one has overflowed, the other says so
+    const int64_t slots = std::max(int64_t{total}, 32 * int64_t{many});  // the second reveals an overflow of the first
     const bool shortest = run.last == run.first + 1;
     if (slots <= most) {
       const Status status = room(slots);
@@ -213,7 +213,7 @@ void GpuRasterizerBackward::BlendRun(const RenderOptions& options, const Run& ru
                 {{1, r.kept.get()}, {2, run.pixels}, {3, backgrounds_.get()}}, Word(run.last - run.first));
   if (r.count == 0) return;
 
-  const auto sums_at = Word(r.count);  // of the scan
+  const auto sums_at = Word(r.count);  // offset of the scan's sums
   r.device->Clear(*slots_, 0, static_cast<uint64_t>(4 * run.slots));
   if (r.total_pairs > 0) {
     BlendParameters blend{};
@@ -245,10 +245,10 @@ void GpuRasterizerBackward::BlendRun(const RenderOptions& options, const Run& ru
                  {4, slots_.get(), 0, touched},
                  {5, slots_.get(), touched, 12 * touched},
                  {6, sums_.get()}},
-                GpuGroups(12 * static_cast<uint64_t>(r.count)));
+                GpuWorkgroups(12 * static_cast<uint64_t>(r.count)));
 }
 
-// Of a gradient on the GPU or, piece by piece where it is too long for a binding, of one in host memory.
+// For a gradient on the GPU or, in pieces if too long for a binding, in host memory.
 Status GpuRasterizerBackward::BlendAll(const RenderOptions& options, const GpuPictureGradient& gradient,
                                        const RenderGradient* host) {
   GpuRasterizer& r = *rasterizer_;
@@ -332,15 +332,16 @@ Status GpuRasterizerBackward::Project(GpuCloud& cloud, const RenderOptions& opti
   GpuGradient& g = gradient_;
   const auto stride = cloud.sh_stride();
   const int64_t fit = static_cast<int64_t>(LargestBinding(*r.device)) / std::max<int64_t>(64, 4 * stride);  // rows
-  int64_t most = std::min(r.count, std::clamp<int64_t>(fit / kGpuGroup * kGpuGroup, kGpuGroup, kRowsAtOnce));
+  int64_t most = std::min(
+      r.count, std::clamp<int64_t>(fit / kGpuWorkgroupSize * kGpuWorkgroupSize, kGpuWorkgroupSize, kRowsAtOnce));
   Status room = MakeRoom(r, most, stride, options.absgrad, g);
-  if (!room.ok()) {  // what Blend took is free now
+  if (!room.ok()) {  // Blend's memory is free now
     slots_.reset();
     pixels_.reset();
     room = MakeRoom(r, most, stride, options.absgrad, g);
   }
-  while (!room.ok() && most > kGpuGroup) {
-    most = (most / 2 + kGpuGroup - 1) / kGpuGroup * kGpuGroup;
+  while (!room.ok() && most > kGpuWorkgroupSize) {
+    most = (most / 2 + kGpuWorkgroupSize - 1) / kGpuWorkgroupSize * kGpuWorkgroupSize;
     room = MakeRoom(r, most, stride, options.absgrad, g);
   }
   ANCHORSPLAT_RETURN_IF_ERROR(room);
@@ -358,7 +359,7 @@ Status GpuRasterizerBackward::Project(GpuCloud& cloud, const RenderOptions& opti
       const GpuBinding seen = rows_of(1, r.seen, g.first, 16), sums = rows_of(2, sums_, g.first, 12);
       const GpuBinding log_scales = rows_of(3, block.log_scales, offset, 3);
       const GpuBinding quats = rows_of(4, block.quats, offset, 4);
-      const uint32_t groups = GpuGroups(static_cast<uint64_t>(g.count));
+      const uint32_t groups = GpuWorkgroups(static_cast<uint64_t>(g.count));
       r.device->Run(kShapes, AsParameters(view),
                     {seen,
                      sums,
@@ -388,7 +389,7 @@ Status GpuRasterizerBackward::Project(GpuCloud& cloud, const RenderOptions& opti
   return {};
 }
 
-// Rows whose projection was left to the CPU (render/unusual.wgsl): so is its gradient.
+// Gradient of rows that were projected on the CPU (render/unusual.wgsl).
 Status GpuRasterizerBackward::ProjectUnusual(const GpuCloud& cloud, const RenderOptions& options,
                                              const GpuGradient& gradient) {
   const GpuRasterizer& r = *rasterizer_;
@@ -414,7 +415,7 @@ Status GpuRasterizerBackward::ProjectUnusual(const GpuCloud& cloud, const Render
   for (size_t k = 0; k < n; ++k) {
     projected[k] = FromGpu(seen[k]);
     gradients[k] = FromGpu(sums[k]);
-    // Culled ones have no sums, and of what is seen anything.
+    // Culled ones have no sums and undefined `seen`.
     if (HasNone(gradients[k])) continue;
     const size_t chunk = k / kProjectChunk;
     visible[chunk * kProjectChunk + static_cast<size_t>(visible_counts[chunk]++)] = static_cast<int32_t>(k);

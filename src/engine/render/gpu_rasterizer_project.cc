@@ -23,7 +23,7 @@ struct PatchParameters {
   uint32_t count, unused[3];
 };
 
-// x as the sum of two floats.
+// x as a sum of two floats.
 void Split(double x, float& high, float& low) {
   high = static_cast<float>(x);
   low = static_cast<float>(x - double{high});
@@ -31,7 +31,7 @@ void Split(double x, float& high, float& low) {
 
 }  // namespace
 
-// False where the range of the kernels' floats does not hold the camera.
+// False if the camera exceeds the range of the kernels' floats.
 bool GpuRasterizer::MakeView(const GpuCloud& cloud, const Camera& camera, float near, const RenderOptions& options) {
   constexpr double kFarthest = 1e9, kPixels = 1e7, kShortest = 1e-3, kWidest = 1e12, kBrightest = 1e30;
   const Pinhole& k = camera.intrinsics;
@@ -71,7 +71,7 @@ bool GpuRasterizer::MakeView(const GpuCloud& cloud, const Camera& camera, float 
   view.planes[3] = options.compensated_from;
   view.cuts[0] = options.min_alpha;
   view.cuts[1] = static_cast<float>(std::log2(double{options.min_alpha}));
-  view.cuts[2] = LeastTransmittance(options);
+  view.cuts[2] = MinTransmittance(options);
   view.cuts[3] = kMaxAlpha;
   view.flags[0] = IsCompensated(options.mode) ? 1 : 0;
   view.flags[1] = options.profile == RasterProfile::kGsplat15 ? 1 : 0;
@@ -87,7 +87,7 @@ void GpuRasterizer::Project(GpuCloud& cloud) {
     GpuView of_block = view;
     of_block.counts[1] = static_cast<uint32_t>(block.first);
     of_block.counts[2] = static_cast<uint32_t>(block.count);
-    const uint32_t groups = GpuGroups(static_cast<uint64_t>(block.count));
+    const uint32_t groups = GpuWorkgroups(static_cast<uint64_t>(block.count));
     device->Run(kProject, AsParameters(of_block),
                 {{1, block.means.get()},
                  {2, block.log_scales.get()},
@@ -104,7 +104,7 @@ void GpuRasterizer::Project(GpuCloud& cloud) {
   }
 }
 
-// The rows that the kernels have left out.
+// Projects the rows that the kernels skipped.
 Status GpuRasterizer::ProjectOnCpu(const GpuCloud& cloud, const Camera& camera, float near,
                                    const RenderOptions& options) {
   std::vector<uint32_t> left(unusual_count);
@@ -152,7 +152,7 @@ Status GpuRasterizer::ProjectOnCpu(const GpuCloud& cloud, const Camera& camera, 
   const std::span<const std::byte> data[4] = {std::as_bytes(std::span(left)), std::as_bytes(std::span(seen_by_cpu)),
                                               std::as_bytes(std::span(packed)), std::as_bytes(std::span(pixels))};
   for (size_t k = 0; k < 4; ++k) {
-    ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, memory[k], data[k].size(), "unusual Gaussians"));
+    ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device, memory[k], data[k].size(), "unusual Gaussians"));
     device->Write(*memory[k], 0, data[k]);
   }
   const PatchParameters parameters = {static_cast<uint32_t>(n), {}};
@@ -164,7 +164,7 @@ Status GpuRasterizer::ProjectOnCpu(const GpuCloud& cloud, const Camera& camera, 
                {5, seen.get()},
                {6, rects.get()},
                {7, radii.get()}},
-              GpuGroups(n));
+              GpuWorkgroups(n));
   device->Clear(*unusual, 0, 4);
   return {};
 }

@@ -9,7 +9,7 @@
 #include "render/project.h"
 #include "render/wgsl.h"
 
-// Pictures without a look of the host between the counts of their tiles and their lists.
+// Pictures without host readback between tile counts and lists.
 namespace anchorsplat {
 
 namespace {
@@ -29,7 +29,7 @@ int64_t PlanesOf(const RenderOptions& options) { return options.depth ? 5 : 4; }
 
 }  // namespace
 
-// What Draw does, of a picture that MakeView and MakeRoom have seen to, in one run of tiles.
+// Draw in a single run of tiles, after MakeView and MakeRoom.
 void GpuRasterizer::RecordAhead(GpuCloud& cloud, int64_t most_pairs, int64_t most_slots, int64_t report) {
   const auto at_most = static_cast<uint64_t>(count);
   Project(cloud);
@@ -63,9 +63,9 @@ Status GpuRasterizer::DrawTogether(GpuCloud& cloud, std::span<Picture> pictures,
                                    int64_t pairs_each) {
   uint64_t bytes = 0;
   for (const Picture& one : pictures) bytes += BytesTogether(one.camera.intrinsics, options);
-  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, together, bytes, "pictures"));
+  ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device, together, bytes, "pictures"));
   ANCHORSPLAT_RETURN_IF_ERROR(
-      GpuRoom(*device, reports, sizeof(Report) * pictures.size(), "what is found out about pictures"));
+      EnsureGpuMemory(*device, reports, sizeof(Report) * pictures.size(), "what is found out about pictures"));
   if (pair_capacity < pairs_each) {
     const Status room = RoomForPairs(pairs_each);
     if (!room.ok()) {
@@ -83,7 +83,7 @@ Status GpuRasterizer::DrawTogether(GpuCloud& cloud, std::span<Picture> pictures,
     if (!one.drawn) continue;
     ANCHORSPLAT_RETURN_IF_ERROR(MakeRoom(/*whole_picture=*/true));
     ANCHORSPLAT_RETURN_IF_ERROR(
-        GpuRoom(*device, tables, GpuSortTableBytes(static_cast<uint64_t>(pairs_each)), "tables of a sort"));
+        EnsureGpuMemory(*device, tables, GpuSortTableBytes(static_cast<uint64_t>(pairs_each)), "tables of a sort"));
     RecordAhead(cloud, pairs_each, kAny, static_cast<int64_t>(k));
     const auto plane = static_cast<uint64_t>(4 * PlanePixels());
     device->Copy(*picture, 0, *together, at, static_cast<uint64_t>(PlanesOf(options)) * plane);

@@ -14,7 +14,7 @@
 #include "render/rasterizer.h"
 #include "render/shown_range.h"
 
-// Pictures of both devices, side by side.
+// Draws pictures on CPU and GPU for comparison.
 namespace anchorsplat::test {
 
 inline RenderOutput DrawOnCpu(const CloudView& cloud, const Camera& camera, const RenderOptions& options,
@@ -32,14 +32,14 @@ inline RenderOutput PictureFor(const Camera& camera, bool depth) {
   const auto shape = [&](int channels, Image& image) {
     image.width = camera.intrinsics.width, image.height = camera.intrinsics.height, image.channels = channels;
     image.pixels.resize(static_cast<size_t>(channels) * static_cast<size_t>(image.plane()));
-    for (float& pixel : image.pixels) pixel = -1;  // what is not drawn shows
+    for (float& pixel : image.pixels) pixel = -1;  // makes unwritten pixels visible
   };
   shape(3, output.color), shape(1, output.alpha);
   if (depth) shape(1, output.depth);
   return output;
 }
 
-// By the kernels, without the way back to the CPU that Rasterizer has.
+// Draws with the kernels only, without Rasterizer's fallback to the CPU.
 inline RenderOutput DrawOnGpu(GpuRasterizer& gpu, const CloudView& cloud, const Camera& camera,
                               const RenderOptions& options) {
   RenderOutput output = PictureFor(camera, options.depth);
@@ -53,11 +53,11 @@ inline RenderOutput DrawOnGpu(GpuRasterizer& gpu, const CloudView& cloud, const 
   return output;
 }
 
-// How two pictures differ. Where a pixel lies right on a cut-off, rounding may decide either way: of many values a few
-// may.
+// Differences between two pictures. A few values may exceed the tolerance, as rounding decides pixels right at a
+// cut-off.
 struct Tally {
   int64_t values = 0, beyond = 0;  // 1e-4
-  double largest = 0;              // of those within
+  double largest = 0;              // of those within 1e-4
 
   void Add(const Image& a, const Image& b) {
     ASSERT_EQ(a.pixels.size(), b.pixels.size());
@@ -68,7 +68,7 @@ struct Tally {
       if (difference <= 1e-4) {
         largest = std::max(largest, difference);
       } else {
-        ++beyond;  // NaN, too
+        ++beyond;  // also NaN
       }
     }
   }
@@ -83,7 +83,7 @@ struct Tally {
 
 inline bool SameBits(const Image& a, const Image& b) {
   return a.pixels.size() == b.pixels.size() &&
-         (a.pixels.empty() ||  // whose data() may be null
+         (a.pixels.empty() ||  // its data() may be null
           std::memcmp(a.pixels.data(), b.pixels.data(), a.pixels.size() * sizeof(float)) == 0);
 }
 inline bool SameBits(const RenderOutput& a, const RenderOutput& b) {

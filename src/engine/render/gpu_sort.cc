@@ -20,7 +20,7 @@ struct SortParameters {
   uint32_t shift, size_at, sums_at, unused;
 };
 
-// The last one: nobody asks for the total of a sort's counts.
+// The last entry: totals of a sort's counts are unused.
 constexpr uint32_t kNoTotal = 15;
 
 void Scan(GpuDevice& device, const ScanParameters& parameters, const GpuBuffer& sizes, const GpuBuffer& items,

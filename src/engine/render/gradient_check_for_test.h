@@ -10,11 +10,11 @@
 #include "core/random.h"
 #include "render/rasterizer_reference.h"
 
-// Gradients against difference quotients of the double-precision reference.
+// Compares gradients with difference quotients of the double-precision reference.
 namespace anchorsplat::test {
 
-// L = Σ weight·output. Pixels where some α or T is near a cut-off have weight 0: a difference quotient is wrong across
-// one.
+// L = Σ weight·output. Pixels with an α or T near a cut-off have weight 0, as difference quotients across one are
+// wrong.
 struct LinearLoss {
   RenderGradient weights;
 
@@ -52,8 +52,8 @@ inline LinearLoss RandomLoss(uint64_t seed, const GaussianCloud& cloud, const Ca
   return loss;
 }
 
-// Whether L is smooth between the two: the same Gaussians in the same order on the same tiles, no colour that is
-// clamped in one of them only.
+// Whether L is smooth between the two: the same Gaussians in the same order on the same tiles, and no colour clamped in
+// only one of them.
 inline bool SamePiece(const std::vector<reference::Splat>& a, const std::vector<reference::Splat>& b) {
   const auto same = [](const reference::Splat& s, const reference::Splat& t) {
     bool clamps = true;
@@ -78,12 +78,12 @@ inline CloudGradient Gradient(const GaussianCloud& cloud, const Camera& camera, 
 }
 
 struct GradientCheck {
-  double relative = 2e-3;  // allowed error, of the value
-  double absolute = 1e-4;  // and of the largest one of its array
-  int64_t stride = 1;      // every stride-th value of an array is looked at
+  double relative = 2e-3;  // allowed error relative to the value
+  double absolute = 1e-4;  // and relative to the array's largest
+  int64_t stride = 1;      // checks every stride-th value of an array
 };
 
-// All stored values and the background.
+// Checks all stored values and the background.
 inline void ExpectGradientMatches(const GaussianCloud& cloud, const Camera& camera, const RenderOptions& options,
                                   const LinearLoss& loss, const GradientCheck& check = {}) {
   const CloudGradient gradient = Gradient(cloud, camera, options, loss.weights);
@@ -96,7 +96,7 @@ inline void ExpectGradientMatches(const GaussianCloud& cloud, const Camera& came
     EXPECT_TRUE(std::isfinite(largest)) << name;
     for (size_t i = 0; i < values.size(); i += static_cast<size_t>(check.stride)) {
       const float value = values[i];
-      if (!std::isfinite(value)) {  // −Inf as a log-scale: there is nothing to move
+      if (!std::isfinite(value)) {  // log-scale −Inf: cannot be moved
         EXPECT_EQ(analytic[i], 0.0f) << name << " " << i;
         continue;
       }

@@ -1,4 +1,4 @@
-// Rows that the CPU has projected (render/unusual.wgsl) to where the others are.
+// Copies rows projected by the CPU (render/unusual.wgsl) to the others.
 
 struct Patch { count: u32 }
 @group(0) @binding(0) var<uniform> patched: Patch;

@@ -14,8 +14,7 @@ inline Piece PieceOf(int64_t count, int64_t pieces, int64_t k) {
   return {std::min(count, k * size), std::min(count, (k + 1) * size)};
 }
 
-// Tiles to be blended by one task. Tiles cost very differently, so tasks are small; empty ones are so cheap that one
-// alone is not worth a task, and one of many Gaussians is.
+// Tiles per blending task. Costs vary greatly, so tasks are small; but a nearly empty tile is not worth a task.
 inline int64_t TilesPerTask(int64_t tiles, int64_t pairs) {
   constexpr int64_t kAtMost = 4, kPairsEnough = 1000;
   return std::clamp<int64_t>(kPairsEnough * tiles / std::max<int64_t>(1, pairs), 1, kAtMost);

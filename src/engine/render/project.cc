@@ -22,7 +22,7 @@ namespace anchorsplat {
 namespace HWY_NAMESPACE {
 namespace {
 
-// Where Gaussians are, in doubles: at x = 1000 px floats are too coarse.
+// Positions in double: at x = 1000 px floats are too coarse.
 struct Places {
   alignas(64) double x[kBatch], y[kBatch], z[kBatch];  // px, px, world units
 };
@@ -30,18 +30,18 @@ struct Places {
 template <typename T>
 struct Columns {
   StoredColumns<T> stored;
-  alignas(64) T drawable[kBatch];  // 1 where the mean is finite and between the planes, else 0
+  alignas(64) T drawable[kBatch];  // 1 if the mean is finite and between the planes, else 0
 };
 
 template <typename T>
 struct Projection {
   alignas(64) T u_xx[kBatch], u_xy[kBatch], u_yy[kBatch];
   alignas(64) T log2_opacity[kBatch], compensation[kBatch];
-  alignas(64) T tile_x0[kBatch], tile_y0[kBatch], tile_x1[kBatch], tile_y1[kBatch];  // tiles, 0 where culled
-  alignas(64) T radius_x[kBatch], radius_y[kBatch];                                  // px, 0 where culled
+  alignas(64) T tile_x0[kBatch], tile_y0[kBatch], tile_x1[kBatch], tile_y1[kBatch];  // tiles, 0 if culled
+  alignas(64) T radius_x[kBatch], radius_y[kBatch];                                  // px, 0 if culled
 };
 
-// The view, and what only this direction needs of it.
+// The view, with data that only the forward pass needs.
 struct Frame {
   View view;
   double width, height;  // px
@@ -69,9 +69,9 @@ constexpr double kLargestDet = kIsFloat<T> ? kLargest : 1e300;
 template <typename T>
 constexpr double kSmallestOpacity = kIsFloat<T> ? 1e-37 : 1e-300;
 template <typename T>
-constexpr double kHair = kIsFloat<T> ? 1e-6 : 1e-9;  // px, and per pixel from the picture's corner
+constexpr double kHair = kIsFloat<T> ? 1e-6 : 1e-9;  // margin against rounding: px, plus per pixel from the corner
 
-// One register of means, which are in the columns of `places`, to where they are seen.
+// Projects a register of means, stored in columns of `places`.
 HWY_INLINE void PlaceLanes(const Frame& frame, size_t j, Places& places, Columns<float>& c) {
   const Doubles d;
   const Narrow narrow;
@@ -97,7 +97,7 @@ HWY_INLINE void PlaceLanes(const Frame& frame, size_t j, Places& places, Columns
   hn::Store(hn::DemoteTo(narrow, hn::IfThenElseZero(drawable, one)), narrow, c.drawable + j);
 }
 
-// Gaussians [first, first + n) to columns. Lanes after the last one are finite; their results are not read.
+// Loads Gaussians [first, first + n) into columns. Lanes beyond are finite, and their results unused.
 void ReadColumns(const ProjectParams& p, const Frame& frame, int64_t first, size_t n, Places& places,
                  Columns<float>& c) {
   const Doubles d;
@@ -120,7 +120,7 @@ void ReadColumns(const ProjectParams& p, const Frame& frame, int64_t first, size
   }
 }
 
-// One register of Gaussians, columns j … j + lanes − 1. `extreme`: not to be trusted, see IsExtreme.
+// Projects a register of Gaussians, columns j … j + lanes − 1. `extreme`: unreliable results, see IsExtreme.
 template <class D, typename T = hn::TFromD<D>>
 HWY_INLINE hn::Mask<D> ProjectLanes(D d, const Frame& frame, RasterProfile profile, RenderMode mode,
                                     const Columns<T>& in, size_t j, Projection<T>& out) {
@@ -131,7 +131,7 @@ HWY_INLINE hn::Mask<D> ProjectLanes(D d, const Frame& frame, RasterProfile profi
   const V logit = hn::Load(d, in.stored.logits + j);
   const auto stored = [&](const T* column) HWY_ATTR { return hn::Load(d, column + j); };
   const auto finite = [&](const T* column) HWY_ATTR { return hn::Le(hn::Abs(stored(column)), Number(d, kLargest)); };
-  const auto fits = [&](const T* column) HWY_ATTR { return hn::Le(stored(column), Number(d, kLargestLogScale)); };
+  const auto fits = [&](const T* column) HWY_ATTR { return hn::Le(stored(column), Number(d, kMaxLogScale)); };
   const auto& quats = in.stored.quats;
   const auto& log_scales = in.stored.log_scales;
   M keep = hn::And(hn::And(finite(quats[0]), finite(quats[1])), hn::And(finite(quats[2]), finite(quats[3])));
@@ -145,14 +145,14 @@ HWY_INLINE hn::Mask<D> ProjectLanes(D d, const Frame& frame, RasterProfile profi
   const V xx = covariance.xx, xy = covariance.xy, yy = covariance.yy, det = covariance.det;
   const bool compensated = IsCompensated(mode);
   const M extreme = hn::And(keep, IsExtreme(d, shape, compensated ? covariance.from_det : det));
-  keep = hn::And(keep, hn::And(hn::Gt(det, zero), hn::Lt(det, Number(d, kLargestDet<T>))));  // false for NaN, too
+  keep = hn::And(keep, hn::And(hn::Gt(det, zero), hn::Lt(det, Number(d, kLargestDet<T>))));  // also false for NaN
   const V safe_det = hn::IfThenElse(keep, det, one);
 
   // Opacity.
   V compensation = one;
   if (compensated) compensation = hn::Sqrt(hn::Div(covariance.from_det, safe_det));
   const V opacity = hn::Div(compensation, hn::Add(one, ExpInDomain(d, hn::Neg(logit))));
-  // The bound keeps log inside its domain; such an opacity is culled.
+  // The bound keeps log inside its domain; such opacities are culled.
   const V log2_opacity =
       hn::Mul(Number(d, std::numbers::log2e), hn::Log(d, hn::Max(opacity, Number(d, kSmallestOpacity<T>))));
   const V room = hn::Sub(log2_opacity, Number(d, frame.log2_min_alpha));            // log2(opacity / min_alpha)
@@ -178,7 +178,7 @@ HWY_INLINE hn::Mask<D> ProjectLanes(D d, const Frame& frame, RasterProfile profi
   hn::Store(hn::IfThenElseZero(keep, radius_y), d, out.radius_y + j);
   keep = hn::And(keep, hn::Ge(room, zero));
 
-  // Tiles of the square, and those of the pixel centres within the ellipse's box; a hair more against rounding.
+  // Tiles of the square, intersected with those of pixel centres in the ellipse's box, with a margin against rounding.
   const V per_tile = Number(d, 1.0 / kTile), centre = Number(d, 0.5), hair = Number(d, kHair<T>);
   const V half_x = hn::Sqrt(hn::Mul(reach2, xx)), half_y = hn::Sqrt(hn::Mul(reach2, yy));
   const V margin_x = hn::MulAdd(hair, hn::Add(hn::Abs(px), half_x), hair),
@@ -213,7 +213,7 @@ HWY_INLINE hn::Mask<D> ProjectLanes(D d, const Frame& frame, RasterProfile profi
   return extreme;
 }
 
-// Column j of the batch once more in double.
+// Recomputes column j of the batch in double.
 void ProjectAgain(const ProjectParams& p, const Frame& frame, const Places& places, int64_t i, size_t j,
                   Projection<float>& out) {
   Columns<double> in;
@@ -237,7 +237,7 @@ void ProjectAgain(const ProjectParams& p, const Frame& frame, const Places& plac
   out.radius_y[j] = static_cast<float>(std::min(exact.radius_y[0], widest));
 }
 
-// Gaussians [first, last): at most one chunk.
+// Gaussians [first, last), at most one chunk.
 void ProjectChunk(const ProjectParams& p, int64_t first, int64_t last) {
   const Frame frame = MakeFrame(p);
   Places places;
@@ -263,7 +263,7 @@ void ProjectChunk(const ProjectParams& p, int64_t first, int64_t last) {
     for (size_t j = 0; j < n; ++j) {
       const int64_t i = begin + static_cast<int64_t>(j);
       if (p.radii != nullptr) {
-        constexpr float kLargestRadius = 2147483520.0f;  // of the floats that an int32 holds
+        constexpr float kLargestRadius = 2147483520.0f;  // largest float that fits an int32
         p.radii[2 * i] = static_cast<int32_t>(std::min(out.radius_x[j], kLargestRadius));
         p.radii[2 * i + 1] = static_cast<int32_t>(std::min(out.radius_y[j], kLargestRadius));
       }

@@ -1,5 +1,5 @@
-// Where the Gaussians of a block of the cloud are seen, and on which tiles: the twin of render/project.cc, formula by
-// formula. Places are wide (render/accurate.wgsl), shapes are floats.
+// Projects the Gaussians of a block of the cloud and finds their tiles: counterpart of render/project.cc, formula by
+// formula. Positions are wide (render/accurate.wgsl), shapes are floats.
 
 @group(0) @binding(1) var<storage, read> means: array<f32>;
 @group(0) @binding(2) var<storage, read> log_scales: array<f32>;
@@ -28,13 +28,13 @@ fn Scale(log_scale: f32) -> f32 {
 
 @compute @workgroup_size(256)
 fn project(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
-  let i = GroupNumber(group) * 256u + lane;  // of the block
+  let i = GroupNumber(group) * 256u + lane;  // index in the block
   if (i >= view.counts.z) { return; }
   let row = view.counts.y + i;
   rects[row] = vec2u(0u);
   radii[row] = vec2i(0);
 
-  // Usable, and within the range of what follows.
+  // Usable, and within the range of the computations below.
   let mean = vec3f(means[3u * i], means[3u * i + 1u], means[3u * i + 2u]);
   let log_scale = vec3f(log_scales[3u * i], log_scales[3u * i + 1u], log_scales[3u * i + 2u]);
   let quat = quats[i];
@@ -42,7 +42,7 @@ fn project(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
   let farthest = max(Magnitude(mean.x), max(Magnitude(mean.y), Magnitude(mean.z)));
   let longest_quat = max(max(Magnitude(quat.x), Magnitude(quat.y)), max(Magnitude(quat.z), Magnitude(quat.w)));
   if (farthest >= INFINITE || longest_quat >= INFINITE || Magnitude(logit) > INFINITE) { return; }
-  var longest_log_scale = 0u;  // of those above 1: bits of positive numbers sort like them, NaN last
+  var longest_log_scale = 0u;  // of those above 1: bits of positive floats sort like them, NaN last
   for (var k = 0u; k < 3u; k++) {
     let bits = bitcast<u32>(log_scale[k]);
     if (Magnitude(log_scale[k]) > INFINITE) { return; }
@@ -56,7 +56,7 @@ fn project(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     return;
   }
 
-  // Place.
+  // Position.
   let z = PlaceAlong(view.r2, view.r2_low, mean);
   if (z.x < view.planes.x || (z.x == view.planes.x && z.y < 0.0)) { return; }
   if (z.x > view.planes.y || (z.x == view.planes.y && z.y > 0.0)) { return; }
@@ -112,7 +112,7 @@ fn project(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     return;
   }
 
-  // Opacity. Beyond ±87 it is 0 or 1, as it is where the logit is infinite.
+  // Opacity. Beyond ±87 it is 0 or 1, also for infinite logits.
   var compensation = 1.0;
   if (compensated) { compensation = sqrt(from_det / det); }
   var bounded = 87.0;
@@ -137,7 +137,7 @@ fn project(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
   radii[row] = vec2i(min(radius, vec2f(2147483520.0)));
   if (room < 0.0) { return; }
 
-  // Tiles of the square, and those of the pixel centres within the ellipse's box; a hair more against rounding.
+  // Tiles of the square, intersected with those of pixel centres in the ellipse's box, with a margin against rounding.
   let half = sqrt(reach2 * vec2f(xx, yy));
   let margin = 1e-6 * (abs(at) + half) + 1e-6;
   let box0 = at - half - 0.5 - margin;

@@ -24,7 +24,7 @@ namespace anchorsplat {
 namespace HWY_NAMESPACE {
 namespace {
 
-constexpr size_t kAhead = 24;  // Gaussians that are fetched ahead: rows are large and not all of them are needed
+constexpr size_t kAhead = 24;  // prefetch distance in Gaussians: rows are large and not all are needed
 
 template <typename T>
 struct Columns {
@@ -42,7 +42,7 @@ struct Gradients {
   alignas(64) T means2d[2][kBatch];
 };
 
-// What is not stored of Gaussian i.
+// Derived values of Gaussian i.
 template <typename T>
 HWY_INLINE void ReadRecord(const ProjectBackwardParams& p, const View& view, int64_t i, size_t j, Columns<T>& c) {
   const ProjectedGaussian& g = p.projected[i];
@@ -61,10 +61,10 @@ HWY_INLINE void ReadRecord(const ProjectBackwardParams& p, const View& view, int
   c.qvv[j] = b.qvv;
 }
 
-// `contiguous`: each row is the one behind the row before it.
+// `contiguous`: rows are consecutive.
 void ReadColumns(const ProjectBackwardParams& p, const View& view, const int32_t* rows, size_t n, bool contiguous,
                  Columns<float>& c) {
-  // The last register is filled up with one that is not written.
+  // The last register is padded with one that is not written.
   const size_t end = std::min(kBatch, (n + kLanesAtMost - 1) / kLanesAtMost * kLanesAtMost);
   for (size_t j = contiguous ? ReadWholeRegisters(p, rows[0], n, c.stored) : 0; j < end; ++j) {
     ReadRow(p, rows[std::min(j, n - 1)], j, c.stored);
@@ -72,8 +72,8 @@ void ReadColumns(const ProjectBackwardParams& p, const View& view, const int32_t
   for (size_t j = 0; j < end; ++j) ReadRecord(p, view, rows[std::min(j, n - 1)], j, c);
 }
 
-// One register of Gaussians, columns j … j + lanes − 1: the gradients of what ProjectCpu calculates, in the opposite
-// order; g_x is ∂L/∂x. Returns which ones are not to be trusted, see IsExtreme.
+// Gradients for a register of Gaussians, columns j … j + lanes − 1: ProjectCpu's computation in reverse; g_x is ∂L/∂x.
+// Returns the unreliable ones, see IsExtreme.
 template <class D, typename T = hn::TFromD<D>>
 HWY_INLINE hn::Mask<D> BackwardLanes(D d, const View& view, bool compensated, const Columns<T>& in, size_t j,
                                      Gradients<T>& out) {
@@ -96,9 +96,8 @@ HWY_INLINE hn::Mask<D> BackwardLanes(D d, const View& view, bool compensated, co
   store(g_px, out.means2d[0]);
   store(g_py, out.means2d[1]);
 
-  // ∂L/∂B = 2·∂L/∂Σ₂·B = Wᵀ·M with M = 4 ln²2·(Σ q·(u, v)(u, v)ᵀ)·(W·B). Everything but W has the size of what it is
-  // made of, whatever the shape; the logarithms of the scales, whose gradient is the diagonal of Bᵀ·∂L/∂B = (W·B)ᵀ·M,
-  // do not need W again.
+  // ∂L/∂B = 2·∂L/∂Σ₂·B = Wᵀ·M with M = 4 ln²2·(Σ q·(u, v)(u, v)ᵀ)·(W·B). Everything except W has the magnitude of its
+  // inputs for any shape. The log-scales' gradient, the diagonal of Bᵀ·∂L/∂B = (W·B)ᵀ·M, does not need W again.
   const V scale = Number(d, kFourLn2Squared);
   const V quu = hn::Mul(scale, load(in.quu)), quv = hn::Mul(scale, load(in.quv)), qvv = hn::Mul(scale, load(in.qvv));
   const V x0 = DifferenceOfProducts(w_xx, b0, hn::Neg(w_xy), b3), y0 = hn::Mul(w_yy, b3);
@@ -112,14 +111,14 @@ HWY_INLINE hn::Mask<D> BackwardLanes(D d, const View& view, bool compensated, co
   V g_b0 = hn::Mul(w_xx, m0), g_b3 = hn::MulAdd(w_xy, m0, hn::Mul(w_yy, m3));
   V g_b1 = hn::Mul(w_xx, m1), g_b4 = hn::MulAdd(w_xy, m1, hn::Mul(w_yy, m4));
   V g_b2 = hn::Mul(w_xx, m2), g_b5 = hn::MulAdd(w_xy, m2, hn::Mul(w_yy, m5));
-  V lowest = one;  // of the determinants that are divided by
+  V lowest = one;  // smallest determinant divided by
   if (compensated) {
     // o = sigmoid·sqrt(det Σ_from / det Σ₂), Σ_from with the lesser dilation:  ∂ln o/∂Σ = ½ (Σ_from⁻¹ − Σ₂⁻¹), and
     // again ∂/∂B is twice that times B.
     const auto covariance = CovarianceOf(d, view, shape);
     const auto& [xx, xy, yy, det, from_xx, from_yy, from_det] = covariance;
     lowest = from_det;
-    // Where the determinant is 0, so was the opacity, and the Gaussian is not here.
+    // If the determinant is 0, so is the opacity, and the Gaussian was culled.
     const V by_from = hn::IfThenElseZero(hn::Gt(from_det, zero), hn::Div(q, from_det)), by_det = hn::Div(q, det);
     const V c_xx = hn::MulSub(by_from, from_yy, hn::Mul(by_det, yy)),
             c_yy = hn::MulSub(by_from, from_xx, hn::Mul(by_det, xx)), c_xy = hn::Mul(hn::Sub(by_det, by_from), xy);
@@ -188,7 +187,7 @@ HWY_INLINE hn::Mask<D> BackwardLanes(D d, const View& view, bool compensated, co
   return IsExtreme(d, shape, lowest);
 }
 
-// Column j of the batch once more in double.
+// Recomputes column j of the batch in double.
 void BackwardAgain(const ProjectBackwardParams& p, const View& view, int64_t i, size_t j, Gradients<float>& out) {
   const Doubles d;
   Columns<double> in;
@@ -205,7 +204,7 @@ void BackwardAgain(const ProjectBackwardParams& p, const View& view, int64_t i, 
   for (size_t a = 0; a < 2; ++a) out.means2d[a][j] = static_cast<float>(exact.means2d[a][0]);
 }
 
-// Columns [begin, n).
+// Stores columns [begin, n).
 void WriteRows(const Gradients<float>& g, const int32_t* rows, size_t begin, size_t n, const ProjectBackwardParams& p) {
   for (size_t j = begin; j < n; ++j) {
     const int64_t i = rows[j];
@@ -217,7 +216,7 @@ void WriteRows(const Gradients<float>& g, const int32_t* rows, size_t begin, siz
   }
 }
 
-// Rows one behind the other, by whole registers.
+// Stores consecutive rows in whole registers.
 void WriteContiguous(const Gradients<float>& g, const int32_t* rows, size_t n, const ProjectBackwardParams& p) {
   const Floats d;
   const size_t lanes = hn::Lanes(d), whole = n / lanes * lanes;
@@ -235,7 +234,7 @@ void WriteContiguous(const Gradients<float>& g, const int32_t* rows, size_t n, c
   WriteRows(g, rows, whole, n, p);
 }
 
-// Rows [first, last) have no gradient.
+// Zeroes the gradient of rows [first, last).
 void ClearRows(const ProjectBackwardParams& p, int64_t first, int64_t last) {
   const int64_t n = last - first;
   if (n <= 0) return;
@@ -246,7 +245,7 @@ void ClearRows(const ProjectBackwardParams& p, int64_t first, int64_t last) {
   std::fill_n(p.means2d + 2 * first, 2 * n, 0.0f);
 }
 
-// Gaussians of one chunk.
+// Processes one chunk.
 void BackwardChunk(const ProjectBackwardParams& p, int64_t chunk) {
   const int64_t first = chunk * kProjectChunk, last = std::min(first + kProjectChunk, p.count);
   const View view = MakeView(p);
@@ -258,7 +257,7 @@ void BackwardChunk(const ProjectBackwardParams& p, int64_t chunk) {
   int32_t rows[kBatch];
   const int32_t* visible = p.visible + first;
   const int32_t* end = visible + p.visible_counts[chunk];
-  int64_t written = first;  // rows below are final, or 0 and about to be written
+  int64_t written = first;  // rows below are final or about to be written
   while (visible != end) {
     const size_t most = std::min(kBatch, static_cast<size_t>(end - visible));
     size_t n = 0;
@@ -269,10 +268,10 @@ void BackwardChunk(const ProjectBackwardParams& p, int64_t chunk) {
       }
       const BlendGradient& b = p.gradients[visible[k]];
       rows[n] = visible[k];
-      // Hidden ones have no gradient, and in pictures of objects they are many.
+      // Occluded Gaussians have no gradient; in pictures of objects there are many.
       n += !(b.q == 0 && b.qu == 0 && b.qv == 0 && b.quu == 0 && b.quv == 0 && b.qvv == 0);
     }
-    // Where they are few, it is quicker to take them along than to leave them out.
+    // If there are few, skipping them costs more than processing them.
     const int64_t begin = visible[0], behind = visible[most - 1] + 1;
     const bool contiguous = behind - begin == static_cast<int64_t>(most) && 4 * n >= 3 * most;
     if (contiguous) {

@@ -10,9 +10,8 @@
 
 namespace anchorsplat {
 
-// From the sums of blending to the stored values of geometry and opacity: through the conic, the Jacobian (clamped
-// ratios are constants), the covariance, the quaternion's normalisation, exp and sigmoid, and the compensation of
-// modes that have one.
+// Propagates blending's sums to the stored geometry and opacity: through the conic, the Jacobian (clamped ratios are
+// constant), covariance, quaternion normalisation, exp and sigmoid, and the compensation of modes that have one.
 struct ProjectBackwardParams {
   int64_t count;                // N Gaussians
   const float* means;           // [N,3] world
@@ -24,19 +23,19 @@ struct ProjectBackwardParams {
   RenderMode mode = RenderMode::kClassic;
   float dilation = kDilation;          // px²
   float compensated_from = 0;          // px²
-  const ProjectedGaussian* projected;  // [N] of ProjectCpu
-  const BlendGradient* gradients;      // [N] of SumSlots; read where visible
-  const int32_t* visible;              // [N] rows that are not culled, ascending, each chunk's from c·kProjectChunk on
-  const int32_t* visible_counts;       // [ProjectChunks(N)] how many of each chunk
-  // out; rows of culled Gaussians become 0
+  const ProjectedGaussian* projected;  // [N] from ProjectCpu
+  const BlendGradient* gradients;      // [N] from SumSlots; read if visible
+  const int32_t* visible;              // [N] visible rows, as ProjectParams::visible
+  const int32_t* visible_counts;       // [ProjectChunks(N)] visible rows per chunk
+  // out; 0 for culled Gaussians
   float* mean_gradients;           // [N,3] per world unit
   float* log_scale_gradients;      // [N,3]
   float* quat_gradients;           // [N,4] of the quaternion as stored
   float* opacity_logit_gradients;  // [N]
-  float* means2d;                  // [N,2] ∂L/∂(mean in the picture), per pixel
+  float* means2d;                  // [N,2] ∂L/∂(2-D mean), per pixel
 };
 
-// Gaussians of one chunk, [chunk·kProjectChunk, …).
+// Processes one chunk: Gaussians [chunk·kProjectChunk, …).
 void ProjectBackwardCpu(const ProjectBackwardParams& p, int64_t chunk);
 
 }  // namespace anchorsplat

@@ -1,10 +1,10 @@
-// The twin of project_backward.cc, which has the formulas, with what it calculates again of the projection
-// (projection-inl.h). Compiled behind view.wgsl and accurate.wgsl. Two entry points, as a stage has eight buffers and a Gaussian has more
-// columns: each calculates what its own columns need. All arrays begin with the first Gaussian of the dispatch.
-// Gaussians without sums, which culled ones are, have gradients of 0.
+// Counterpart of project_backward.cc, which has the formulas; recomputes parts of the projection (projection-inl.h).
+// Appended to view.wgsl and accurate.wgsl. Two entry points, as a stage has eight buffers and a Gaussian more columns:
+// each computes what its columns need. Arrays start at the first Gaussian of the dispatch. Gaussians without sums, such
+// as culled ones, have gradient 0.
 
 @group(0) @binding(1) var<storage, read> seen: array<Seen>;
-@group(0) @binding(2) var<storage, read> sums: array<vec4f>;  // [N,12] of gather_slots.wgsl
+@group(0) @binding(2) var<storage, read> sums: array<vec4f>;  // [N,12] from gather_slots.wgsl
 @group(0) @binding(3) var<storage, read> log_scales: array<f32>;
 @group(0) @binding(4) var<storage, read> quats: array<vec4f>;
 @group(0) @binding(5) var<storage, read> opacity_logits: array<f32>;
@@ -22,7 +22,7 @@ fn Scale(log_scale: f32) -> f32 {
   return Exp(max(log_scale, -100.0));
 }
 
-// By their bits: comparing floats may pass over NaN.
+// Compares bits, as float comparisons may ignore NaN.
 fn HasSums(i: u32) -> bool {
   let bits = bitcast<vec4u>(sums[3u * i]) | vec4u(bitcast<vec2u>(sums[3u * i + 1u].xy), 0u, 0u);
   return any((bits & vec4u(0x7fffffffu)) != vec4u(0u));
@@ -36,7 +36,8 @@ fn Backward(i: u32) -> Gradients {
   let ry = view.r1.xyz;
   let rz = view.r2.xyz;
 
-  // The unit quaternion and its rotation, by columns. Not by the square of the norm, which is 0 of short ones, too.
+  // The unit quaternion and its rotation, by columns. Not by the squared norm, which underflows to 0 for short
+  // quaternions.
   let stored = quats[i];
   let largest = max(max(abs(stored.x), abs(stored.y)), max(abs(stored.z), abs(stored.w)));
   let zero_quat = largest == 0.0;
@@ -85,9 +86,9 @@ fn Backward(i: u32) -> Gradients {
   var g_bx = w_xx * mx;
   var g_by = w_xy * mx + w_yy * my;
   if (view.flags.x != 0u) {
-    // ∂ln o/∂Σ = ½ (Σ_from⁻¹ − Σ₂⁻¹), and ∂/∂B is twice that times B. With the minors m = b_x × b_y, the determinant
-    // of B·Bᵀ + δ·I times its inverse times B is, by rows, δ·b_x + b_y × m and δ·b_y + m × b_x: what a needle would
-    // lose as a difference of products is not there. Where the determinant is 0, so was the opacity.
+    // ∂ln o/∂Σ = ½ (Σ_from⁻¹ − Σ₂⁻¹), and ∂/∂B is twice that times B. With the minors m = b_x × b_y, det·(B·Bᵀ +
+    // δ·I)⁻¹·B has the rows δ·b_x + b_y × m and δ·b_y + m × b_x, without the differences of products that lose
+    // precision for needles. If the determinant is 0, so is the opacity.
     let minors = vec3f(DifferenceOfProducts(bx.y, by.z, bx.z, by.y), DifferenceOfProducts(bx.z, by.x, bx.x, by.z),
                        DifferenceOfProducts(bx.x, by.y, bx.y, by.x));
     let sharp_det = dot(minors, minors);
@@ -146,7 +147,7 @@ fn project_backward_shapes(@builtin(workgroup_id) group: vec3u, @builtin(local_i
     let gradients = Backward(i);
     log_scale = gradients.log_scales;
     quat = gradients.quat;
-    // ∂ln sigmoid(x)/∂x = 1/(1 + e^x). Infinities are what they are bounded by.
+    // ∂ln sigmoid(x)/∂x = 1/(1 + e^x). Infinities are clamped.
     var bounded = opacity_logits[i];
     let bits = bitcast<u32>(bounded);
     if ((bits & 0x7fffffffu) > bitcast<u32>(87.0f)) { bounded = select(87.0, -87.0, bits >> 31u == 1u); }
@@ -157,7 +158,7 @@ fn project_backward_shapes(@builtin(workgroup_id) group: vec3u, @builtin(local_i
   opacity_logit_gradients[i] = logit;
 }
 
-// The means' part through the colours is added by spherical_harmonics_backward.wgsl.
+// spherical_harmonics_backward.wgsl adds the means' part through the colours.
 @group(0) @binding(5) var<storage, read_write> mean_gradients: array<f32>;
 @group(0) @binding(6) var<storage, read_write> means2d: array<vec2f>;
 

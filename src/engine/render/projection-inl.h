@@ -1,5 +1,5 @@
-// What both directions of projecting calculate of a Gaussian: its place before the camera, its rotation and lengths,
-// and the factor B of its covariance in the picture, Σ₂ = B·Bᵀ. Compiled once per instruction set, as <hwy/highway.h>.
+// Shared by forward and backward projection: a Gaussian's position in camera space, rotation and scales, and the factor
+// B of its 2-D covariance, Σ₂ = B·Bᵀ. Compiled once per instruction set, as <hwy/highway.h>.
 
 #if defined(ANCHORSPLAT_RENDER_PROJECTION_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef ANCHORSPLAT_RENDER_PROJECTION_INL_H_
@@ -23,17 +23,17 @@ namespace HWY_NAMESPACE {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
-// Shapes are calculated in float, two registers of doubles at a time; see IsExtreme for those that are not.
+// Shapes are computed in float, two registers of doubles at a time; for exceptions see IsExtreme.
 using Floats = hn::CappedTag<float, 16>;
 using Doubles = hn::CappedTag<double, 8>;
-using Narrow = hn::Rebind<float, Doubles>;  // as many floats as there are doubles in a register
+using Narrow = hn::Rebind<float, Doubles>;  // as many floats as doubles in a register
 
-// Gaussians are turned from rows into columns this many at a time: long enough that a column is read after its stores
-// have left the store buffer, short enough for the L1 cache.
+// Gaussians are transposed from rows to columns in batches of this size: long enough that a column's stores have left
+// the store buffer when it is read, short enough for the L1 cache.
 constexpr size_t kBatch = 64;
 constexpr size_t kLanesAtMost = 16;
 
-// Of Gaussians, one per column: what is stored, and where each is seen.
+// Stored values and positions of Gaussians, one per column.
 template <typename T>
 struct StoredColumns {
   alignas(64) T log_scales[3][kBatch];
@@ -42,8 +42,8 @@ struct StoredColumns {
   alignas(64) T inverse_z[kBatch], ratio_x[kBatch], ratio_y[kBatch];  // 1/z, x/z, y/z in camera space, z ≠ 0
 };
 
-// Stored values of rows `first` … to columns, as many whole registers as there are in `n`. Returns how many rows that
-// are; the others go one by one.
+// Loads stored values of rows from `first` into columns, in whole registers; returns the number of rows. The rest is
+// loaded row by row.
 template <typename Params>
 HWY_INLINE size_t ReadWholeRegisters(const Params& p, int64_t first, size_t n, StoredColumns<float>& c) {
   const Floats d;
@@ -66,7 +66,7 @@ HWY_INLINE size_t ReadWholeRegisters(const Params& p, int64_t first, size_t n, S
   return whole;
 }
 
-// The same for one row.
+// Loads one row.
 template <typename Params, typename T>
 HWY_INLINE void ReadRow(const Params& p, int64_t i, size_t j, StoredColumns<T>& c) {
   for (int a = 0; a < 3; ++a) c.log_scales[a][j] = p.log_scales[3 * i + a];
@@ -74,7 +74,7 @@ HWY_INLINE void ReadRow(const Params& p, int64_t i, size_t j, StoredColumns<T>& 
   c.logits[j] = p.opacity_logits[i];
 }
 
-// What does not depend on the Gaussian.
+// Data independent of the Gaussian.
 struct View {
   double r[9], t[3];
   double fx, fy, cx, cy, inverse_fx, inverse_fy;
@@ -115,33 +115,33 @@ HWY_INLINE V Clamped(D d, V x, double low, double high) {
   return hn::Min(hn::Max(x, Number(d, low)), Number(d, high));
 }
 
-// Above the bound a covariance is infinite and its Gaussian culled (in float: handed over to double); it only keeps exp
-// inside its domain.
+// Above the bound, the covariance is infinite and the Gaussian culled (float: recomputed in double); the bound only
+// keeps exp inside its domain.
 template <class D, class V = hn::Vec<D>>
 HWY_INLINE V ExpInDomain(D d, V x) {
   return hn::Exp(d, hn::Min(x, Number(d, sizeof(hn::TFromD<D>) == sizeof(float) ? 87.0 : 690.0)));
 }
 
-// One register of Gaussians. Names are those of the formulas: q the unit quaternion, R_q its rotation, s the lengths,
-// A = J·R (rows for image x and y), B = A·R_q·S.
+// A register of Gaussians, named as in the formulas: q the unit quaternion, R_q its rotation, s the scales, A = J·R
+// (rows for image x and y), B = A·R_q·S.
 //
-// Constructors are written down because the compiler's own would not be of this target, which ARM's vectors insist on.
+// The explicit constructor is compiled for this target, as ARM's vector types require; the implicit one would not be.
 template <class D>
 struct Shape {
   using V = hn::Vec<D>;
   HWY_INLINE Shape() {}
   V inverse_z, ratio_x, ratio_y;  // 1/z, x/z, y/z
   V focal_x, focal_y;             // f/z
-  V u, v;                         // the ratios within the view's limits
+  V u, v;                         // ratios clamped to the view's limits
   V qw, qx, qy, qz, norm2, inverse_norm;
-  hn::Mask<D> zero_quat;  // which counts as (1, 0, 0, 0)
+  hn::Mask<D> zero_quat;  // treated as (1, 0, 0, 0)
   V r00, r01, r02, r10, r11, r12, r20, r21, r22;
   V s0, s1, s2;
   V a0, a1, a2, a3, a4, a5;
   V b0, b1, b2, b3, b4, b5;
 };
 
-// From columns j … j + lanes − 1.
+// Shape of columns j … j + lanes − 1.
 template <class D>
 HWY_INLINE Shape<D> ShapeOf(D d, const View& view, const StoredColumns<hn::TFromD<D>>& in, size_t j) {
   using V = hn::Vec<D>;
@@ -154,7 +154,7 @@ HWY_INLINE Shape<D> ShapeOf(D d, const View& view, const StoredColumns<hn::TFrom
   V qw = hn::Load(d, in.quats[0] + j), qx = hn::Load(d, in.quats[1] + j), qy = hn::Load(d, in.quats[2] + j),
     qz = hn::Load(d, in.quats[3] + j);
   g.norm2 = hn::Add(Dot3(qw, qx, qy, qw, qx, qy), hn::Mul(qz, qz));
-  // Not by the square, which is 0 of short ones, too.
+  // Not by the squared norm, which underflows to 0 for short quaternions.
   g.zero_quat = hn::Eq(hn::Max(hn::Max(hn::Abs(qw), hn::Abs(qx)), hn::Max(hn::Abs(qy), hn::Abs(qz))), hn::Zero(d));
   g.inverse_norm = hn::IfThenElse(g.zero_quat, one, hn::Div(one, hn::Sqrt(g.norm2)));
   qw = g.qw = hn::IfThenElse(g.zero_quat, one, hn::Mul(qw, g.inverse_norm));
@@ -189,7 +189,7 @@ HWY_INLINE Shape<D> ShapeOf(D d, const View& view, const StoredColumns<hn::TFrom
   return g;
 }
 
-// a·b − c·d without the cancellation of the two roundings (Kahan), where multiply-adds are fused.
+// a·b − c·d without cancellation of rounding errors (Kahan), given fused multiply-add.
 template <class V>
 HWY_INLINE V DifferenceOfProducts(V a, V b, V c, V d) {
   const V second = hn::Mul(c, d);
@@ -197,7 +197,7 @@ HWY_INLINE V DifferenceOfProducts(V a, V b, V c, V d) {
   return hn::Add(hn::MulSub(a, b, second), error);
 }
 
-// Σ₂ in pixels² with the dilation (xx, yy) and with the lesser dilation that opacities are compensated from.
+// Σ₂ in pixels² with the dilation (xx, yy), and with the smaller dilation that opacities are compensated from.
 template <class V>
 struct Covariance {
   HWY_INLINE Covariance() {}
@@ -208,8 +208,8 @@ template <class D, class V = hn::Vec<D>>
 HWY_INLINE Covariance<V> CovarianceOf(D d, const View& view, const Shape<D>& g) {
   const V sharp_xx = Dot3(g.b0, g.b1, g.b2, g.b0, g.b1, g.b2), sharp_yy = Dot3(g.b3, g.b4, g.b5, g.b3, g.b4, g.b5);
   const V dilation = Number(d, view.dilation), from = Number(d, view.compensated_from);
-  // det(B·Bᵀ) as the sum of the squares of B's minors (Cauchy-Binet), and what a dilation δ adds to it, δ·trace + δ²:
-  // no term is negative, and a needle keeps the digits that xx·yy − xy² would lose.
+  // det(B·Bᵀ) as the sum of the squares of B's minors (Cauchy-Binet), plus δ·trace + δ² for a dilation δ: all terms are
+  // non-negative, so a needle keeps the precision that xx·yy − xy² would lose.
   const V minor0 = DifferenceOfProducts(g.b1, g.b5, g.b2, g.b4), minor1 = DifferenceOfProducts(g.b2, g.b3, g.b0, g.b5),
           minor2 = DifferenceOfProducts(g.b0, g.b4, g.b1, g.b3);
   const V sharp_det = Dot3(minor0, minor1, minor2, minor0, minor1, minor2), trace = hn::Add(sharp_xx, sharp_yy);
@@ -222,14 +222,13 @@ HWY_INLINE Covariance<V> CovarianceOf(D d, const View& view, const Shape<D>& g) 
   return c;
 }
 
-// Gaussians whose numbers leave the range in which floats hold their squares: they are calculated in double, each by
-// itself, so that none depends on its neighbours. `lowest` is the smallest determinant that is divided by. NaN counts
-// as extreme.
+// Gaussians whose values exceed the range in which floats can be squared. They are computed in double, separately, so
+// that results do not depend on neighbours. `lowest` is the smallest determinant divided by. NaN counts as extreme.
 template <class D, class V = hn::Vec<D>>
 HWY_INLINE hn::Mask<D> IsExtreme(D d, const Shape<D>& g, V lowest) {
   const V longest = hn::Max(hn::Max(hn::Max(hn::Abs(g.b0), hn::Abs(g.b1)), hn::Max(hn::Abs(g.b2), hn::Abs(g.b3))),
                             hn::Max(hn::Abs(g.b4), hn::Abs(g.b5)));
-  const V sum = hn::Add(Dot3(g.b0, g.b1, g.b2, g.b3, g.b4, g.b5), g.norm2);  // NaN if one is, which Max may lose
+  const V sum = hn::Add(Dot3(g.b0, g.b1, g.b2, g.b3, g.b4, g.b5), g.norm2);  // NaN if one is; Max may lose it
   const V scale = hn::Max(hn::Max(g.s0, g.s1), hn::Max(g.s2, hn::Max(g.focal_x, g.focal_y)));
   const auto longest_fits = hn::And(hn::Le(longest, Number(d, 1e8)), hn::Le(scale, Number(d, 1e20)));
   const auto det_fits = hn::Ge(lowest, Number(d, 1e-30));

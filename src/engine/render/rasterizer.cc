@@ -109,7 +109,7 @@ SphericalHarmonicsParams SphericalHarmonicsInputs(const CloudView& cloud, const 
   return sh;
 }
 
-// Projection and colours. Returns how many Gaussians are visible.
+// Projects and colours Gaussians; returns the number of visible ones.
 int64_t Rasterizer::State::Project(const CloudView& cloud, const Camera& camera, float near,
                                    const RenderOptions& options, Stopwatch& watch) {
   const int64_t n = cloud.size();
@@ -134,11 +134,11 @@ int64_t Rasterizer::State::Project(const CloudView& cloud, const Camera& camera,
   return std::accumulate(visible_counts.data(), visible_counts.data() + chunks, int64_t{0});
 }
 
-// Pieces of per-Gaussian work that has to be split by hand: enough for all threads, but not so many that the tables
-// each one needs outweigh its work.
+// Number of pieces for manually split per-Gaussian work: enough for all threads, but few enough that their tables do
+// not dominate.
 int64_t PieceCount(int64_t count) { return std::clamp<int64_t>(count / 4096, 1, ThreadCount()); }
 
-// `rows` becomes the visible Gaussians by depth; those of the same depth stay in order.
+// Sorts the visible Gaussians by depth into `rows`; stable.
 void Rasterizer::State::Sort(int64_t count, int64_t total) {
   SortParams sort{};
   sort.count = total;
@@ -148,7 +148,7 @@ void Rasterizer::State::Sort(int64_t count, int64_t total) {
   sort.spare_rows = Room(spare_rows, total);
   sort.chunks = PieceCount(total);
   sort.histograms = Room(histograms, sort.chunks * kSortBuckets);
-  // Closes the gaps between the chunks' lists.
+  // Compacts the chunks' lists.
   const int64_t chunk_total = ProjectChunks(count);
   int64_t* starts = Room(visible_starts, chunk_total);
   std::exclusive_scan(visible_counts.data(), visible_counts.data() + chunk_total, starts, int64_t{0});
@@ -159,7 +159,7 @@ void Rasterizer::State::Sort(int64_t count, int64_t total) {
       for (int64_t k = 0; k < visible_counts[static_cast<size_t>(chunk)]; ++k) {
         const int32_t i = from[k];
         sort.rows[to + k] = i;
-        // Depths are positive (the near plane is), so their bits sort like they do.
+        // Depths are positive (beyond the near plane), so their bits sort like floats.
         sort.keys[to + k] = std::bit_cast<uint32_t>(projected[static_cast<size_t>(i)].depth);
       }
     }
@@ -199,7 +199,7 @@ void Rasterizer::State::BinAndBlend(int64_t visible_total, const Camera& camera,
   blend.tile_offsets = bin.tile_offsets;
   std::copy(options.background.begin(), options.background.end(), blend.background);
   blend.min_alpha = options.min_alpha;
-  blend.min_transmittance = LeastTransmittance(options);
+  blend.min_transmittance = MinTransmittance(options);
   blend.color = output.color.pixels.data();
   blend.alpha = output.alpha.pixels.data();
   blend.depth = options.depth ? output.depth.pixels.data() : nullptr;
@@ -245,28 +245,28 @@ GpuRasterizer* Rasterizer::State::OpenGpu() {
   return gpu.get();
 }
 
-Result<GpuCloud*> Rasterizer::State::Upload(const Subject& subject) {
-  if (subject.still != nullptr) {
+Result<GpuCloud*> Rasterizer::State::Upload(const Source& source) {
+  if (source.constant != nullptr) {
     gpu_cloud = GpuCloud();
-    return subject.still->On(gpu->device);
+    return source.constant->On(gpu->device);
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(gpu_cloud.Assign(*gpu->device, subject.cloud));
+  ANCHORSPLAT_RETURN_IF_ERROR(gpu_cloud.Assign(*gpu->device, source.cloud));
   return &gpu_cloud;
 }
 
-bool Rasterizer::State::DrawOnGpu(const Subject& subject, const Camera& camera, float near,
-                                  const RenderOptions& options, RenderOutput& output) {
+bool Rasterizer::State::DrawOnGpu(const Source& source, const Camera& camera, float near, const RenderOptions& options,
+                                  RenderOutput& output) {
   if (OpenGpu() == nullptr) {
-    if (subject.still != nullptr) subject.still->Leave();
+    if (source.constant != nullptr) source.constant->Release();
     return false;
   }
   Stopwatch watch;
-  const Result<GpuCloud*> uploaded = Upload(subject);
+  const Result<GpuCloud*> uploaded = Upload(source);
   const Result<bool> drawn =
       uploaded.ok() ? gpu->Draw(**uploaded, camera, near, options, &output) : Result<bool>(uploaded.error());
   if (!drawn.ok()) {
     DropGpu();
-    if (subject.still != nullptr) subject.still->Leave();
+    if (source.constant != nullptr) source.constant->Release();
     GiveUpGpu(drawn.error());
     return false;
   }
@@ -276,7 +276,7 @@ bool Rasterizer::State::DrawOnGpu(const Subject& subject, const Camera& camera, 
   statistics.visible = gpu->visible;
   statistics.pairs = gpu->total_pairs;
   statistics.runs = gpu->runs;
-  if (subject.still != nullptr) subject.still->NotePairs(gpu->total_pairs);
+  if (source.constant != nullptr) source.constant->NotePairs(gpu->total_pairs);
   return true;
 }
 
@@ -299,16 +299,17 @@ Status ValidateRender(const Camera& camera, const RenderOptions& options) {
 
 Status Rasterizer::Render(const CloudView& cloud, const Camera& camera, const RenderOptions& options,
                           RenderOutput& output) {
-  return RenderSubject({cloud}, camera, options, output);
+  return RenderSource({cloud}, camera, options, output);
 }
 
-Status Rasterizer::Render(StillCloud& cloud, const Camera& camera, const RenderOptions& options, RenderOutput& output) {
-  return RenderSubject({cloud.view(), &cloud}, camera, options, output);
+Status Rasterizer::Render(ConstantCloud& cloud, const Camera& camera, const RenderOptions& options,
+                          RenderOutput& output) {
+  return RenderSource({cloud.view(), &cloud}, camera, options, output);
 }
 
-Status Rasterizer::RenderSubject(const Subject& subject, const Camera& world_camera, const RenderOptions& options,
-                                 RenderOutput& output) {
-  const CloudView& cloud = subject.cloud;
+Status Rasterizer::RenderSource(const Source& source, const Camera& world_camera, const RenderOptions& options,
+                                RenderOutput& output) {
+  const CloudView& cloud = source.cloud;
   state_->kept.reset();
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   ANCHORSPLAT_RETURN_IF_ERROR(ValidateRender(world_camera, options));
@@ -318,11 +319,11 @@ Status Rasterizer::RenderSubject(const Subject& subject, const Camera& world_cam
   }
   Camera camera;
   camera.intrinsics = world_camera.intrinsics;
-  camera.world_to_camera = FromOrigin(world_camera.world_to_camera, cloud.origin);
+  camera.world_to_camera = RelativeToOrigin(world_camera.world_to_camera, cloud.origin);
   const int width = camera.intrinsics.width, height = camera.intrinsics.height;
   try {
     ShapeFor(camera, options, output);
-    const bool on_gpu = state_->DrawOnGpu(subject, camera, near, options, output);
+    const bool on_gpu = state_->DrawOnGpu(source, camera, near, options, output);
     if (!on_gpu) state_->DrawOnCpu(cloud, camera, near, options, output);
     if (options.gradient) {
       state_->kept = {.intrinsics = camera.intrinsics,

@@ -30,7 +30,7 @@ Error NoMemory(int64_t count) {
   return {ErrorCode::kIo, Cat("not enough memory for the gradient of ", WithThousands(count), " Gaussians")};
 }
 
-// Of a picture of `count` Gaussians.
+// Slot parameters of a picture with `count` Gaussians.
 Status CheckCloud(const CloudView& cloud, int64_t count, int sh_degree) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   if (cloud.size() == count && cloud.sh_degree == sh_degree) return {};
@@ -59,8 +59,7 @@ Status CheckGradient(const RenderGradient& g, int width, int height) {
   return {};
 }
 
-// Slots of tiles (render/gradient_slots.h) that are there at once: 150 MiB. Where there are more, the tiles are done in
-// several runs.
+// Maximum slots (render/gradient_slots.h) at once, 150 MiB. With more, tiles are processed in several runs.
 constexpr int64_t kMaxSlots = int64_t{1} << 22;
 
 }  // namespace
@@ -70,13 +69,13 @@ std::optional<Rasterizer::State::SlotsLeft> Rasterizer::State::BlendBackward(con
   const RenderOptions& options = kept->options;
   const BinParams bin = MakeBinParams(statistics.visible, kept->intrinsics, options.min_alpha);
   const int64_t tile_count = int64_t{bin.tiles_x} * bin.tiles_y, chunks = ProjectChunks(kept->count);
-  // The list of the last run of tiles is still there: with one run that is all of them.
+  // The list of the last run of tiles still exists; with one run it covers all.
   const bool listed = statistics.runs == 1;
   if (!listed) CountPairs(bin);
   int64_t* starts = Room(slot_starts, chunks);
   std::exclusive_scan(slot_counts.data(), slot_counts.data() + chunks, starts, int64_t{0});
   int64_t slot_count = std::accumulate(slot_counts.data(), slot_counts.data() + chunks, int64_t{0});
-  // One thread adds to the gradients right away; several need slots, if possible all at once.
+  // A single thread adds directly to the gradients; multiple threads need slots, if possible all at once.
   const bool apart = ThreadCount() > 1, at_once = apart && listed && slot_count <= kMaxSlots;
 
   SlotsLeft left{};
@@ -128,7 +127,7 @@ std::optional<Rasterizer::State::SlotsLeft> Rasterizer::State::BlendBackward(con
       }
       if (!at_once) {
         left.params.first_tile = p.first_tile;
-        left.params.last_tile = std::min(listed_to, EndOfRun(bin, p.first_tile, kMaxSlots));  // no pair without a slot
+        left.params.last_tile = std::min(listed_to, EndOfRun(bin, p.first_tile, kMaxSlots));  // every pair needs a slot
         slot_count = PlaceSlots(left.params, kMaxSlots, starts);
       }
       p.last_tile = left.params.last_tile;
@@ -197,7 +196,7 @@ void Rasterizer::State::ProjectBackward(const std::optional<SlotsLeft>& left, co
   sh.step = step;
 
   float* absolute = kept->options.absgrad ? gradient.means2d_abs.data() : nullptr;
-  // All of a chunk while it is in the cache.
+  // All stages of a chunk while it is in the cache.
   ParallelFor(0, ProjectChunks(kept->count), 1, [&](int64_t first, int64_t last) {
     for (int64_t chunk = first; chunk < last; ++chunk) {
       if (left) {
@@ -211,9 +210,9 @@ void Rasterizer::State::ProjectBackward(const std::optional<SlotsLeft>& left, co
   });
 }
 
-void Rasterizer::State::DrawAgainOnCpu(const Subject& subject) {
+void Rasterizer::State::DrawAgainOnCpu(const Source& source) {
   DropGpu();
-  if (subject.still != nullptr) subject.still->Leave();
+  if (source.constant != nullptr) source.constant->Release();
   Camera camera;
   camera.intrinsics = kept->intrinsics;
   camera.world_to_camera = kept->world_to_camera;
@@ -222,13 +221,13 @@ void Rasterizer::State::DrawAgainOnCpu(const Subject& subject) {
   RenderOutput again;
   again.color = Image(camera.intrinsics.width, camera.intrinsics.height, 3);
   again.alpha = Image(camera.intrinsics.width, camera.intrinsics.height, 1);
-  DrawOnCpu(subject.cloud, camera, kept->near, options, again);
+  DrawOnCpu(source.cloud, camera, kept->near, options, again);
   kept->on_gpu = false;
 }
 
-Status Rasterizer::State::BackwardOnGpu(const Subject& subject, const RenderGradient& output_gradient,
+Status Rasterizer::State::BackwardOnGpu(const Source& source, const RenderGradient& output_gradient,
                                         const CoefficientStep* step, CloudGradient& gradient) {
-  const CloudView& cloud = subject.cloud;
+  const CloudView& cloud = source.cloud;
   Stopwatch watch;
   const RenderOptions& options = kept->options;
   GpuDevice& device = *gpu->device;
@@ -237,10 +236,10 @@ Status Rasterizer::State::BackwardOnGpu(const Subject& subject, const RenderGrad
   ANCHORSPLAT_RETURN_IF_ERROR(gpu_backward->ReadBackground(gradient.background));
   statistics.blend_backward = watch.Lap();
 
-  // What is streamed, has been given back or is read on the host is read from this call's cloud.
+  // Streamed, dropped or host-side data is read from this call's cloud.
   GpuCloud* drawn = &gpu_cloud;
-  if (subject.still != nullptr || gpu_cloud.empty() || !gpu_cloud.resident() || !gpu->unusual_rows.empty()) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(drawn, Upload(subject));
+  if (source.constant != nullptr || gpu_cloud.empty() || !gpu_cloud.resident() || !gpu->unusual_rows.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(drawn, Upload(source));
   }
   const auto n = static_cast<size_t>(kept->count);
   const auto stride = static_cast<size_t>(cloud.sh_stride());
@@ -252,7 +251,7 @@ Status Rasterizer::State::BackwardOnGpu(const Subject& subject, const RenderGrad
   gradient.means2d.resize(2 * n);
   gradient.means2d_abs.resize(options.absgrad ? 2 * n : 0);
   gradient.radii.resize(2 * n);
-  // The step is taken at the end, when nothing can fail that would have to be done again.
+  // The step comes last, when nothing can fail and need a retry.
   float* sh = step == nullptr ? gradient.sh.data() : Room(sh_gradients, static_cast<int64_t>(stride * n));
   ANCHORSPLAT_RETURN_IF_ERROR(gpu_backward->Project(*drawn, options, [&](const GpuGradient& part) -> Status {
     std::vector<GpuRead> reads;
@@ -278,7 +277,7 @@ Status Rasterizer::State::BackwardOnGpu(const Subject& subject, const RenderGrad
   return {};
 }
 
-Status Rasterizer::State::BackwardToSeenOnGpu(const RenderGradient& output_gradient) {
+Status Rasterizer::State::BackwardToAppearanceOnGpu(const RenderGradient& output_gradient) {
   constexpr int64_t kRowsRead = int64_t{1} << 18;
   Stopwatch watch;
   GpuDevice& device = *gpu->device;
@@ -306,10 +305,10 @@ Status Rasterizer::State::BackwardToSeenOnGpu(const RenderGradient& output_gradi
   return {};
 }
 
-void Rasterizer::State::BackwardToSeenOnCpu(const RenderGradient& output_gradient) {
+void Rasterizer::State::BackwardToAppearanceOnCpu(const RenderGradient& output_gradient) {
   Stopwatch watch;
   CloudGradient unused;
-  // Slots are added up for visible Gaussians alone; all others have learned nothing.
+  // Slots are summed only for visible Gaussians; the others are 0.
   BlendGradient* sums = Room(gradients, kept->count);
   ParallelFor(0, kept->count, int64_t{1} << 16,
               [&](int64_t first, int64_t last) { std::fill(sums + first, sums + last, BlendGradient{}); });
@@ -324,16 +323,16 @@ void Rasterizer::State::BackwardToSeenOnCpu(const RenderGradient& output_gradien
 
 Status Rasterizer::Backward(const CloudView& cloud, const RenderGradient& output_gradient, CloudGradient& gradient,
                             const CoefficientStep* step) {
-  return BackwardOfSubject({cloud}, output_gradient, gradient, step);
+  return BackwardOfSource({cloud}, output_gradient, gradient, step);
 }
 
-Status Rasterizer::Backward(StillCloud& cloud, const RenderGradient& output_gradient, CloudGradient& gradient) {
-  return BackwardOfSubject({cloud.view(), &cloud}, output_gradient, gradient, nullptr);
+Status Rasterizer::Backward(ConstantCloud& cloud, const RenderGradient& output_gradient, CloudGradient& gradient) {
+  return BackwardOfSource({cloud.view(), &cloud}, output_gradient, gradient, nullptr);
 }
 
-Status Rasterizer::BackwardOfSubject(const Subject& subject, const RenderGradient& output_gradient,
-                                     CloudGradient& gradient, const CoefficientStep* step) {
-  const CloudView& cloud = subject.cloud;
+Status Rasterizer::BackwardOfSource(const Source& source, const RenderGradient& output_gradient,
+                                    CloudGradient& gradient, const CoefficientStep* step) {
+  const CloudView& cloud = source.cloud;
   if (!state_->kept) return NoPicture();
   const State::Kept& kept = *state_->kept;
   ANCHORSPLAT_RETURN_IF_ERROR(CheckCloud(cloud, kept.count, kept.sh_degree));
@@ -344,10 +343,10 @@ Status Rasterizer::BackwardOfSubject(const Subject& subject, const RenderGradien
   }
   try {
     if (kept.on_gpu) {
-      const Status status = state_->BackwardOnGpu(subject, output_gradient, step, gradient);
+      const Status status = state_->BackwardOnGpu(source, output_gradient, step, gradient);
       if (status.ok()) return {};
       GiveUpGpu(status.error());
-      state_->DrawAgainOnCpu(subject);
+      state_->DrawAgainOnCpu(source);
     }
     Stopwatch watch;
     const std::optional<State::SlotsLeft> left = state_->BlendBackward(output_gradient, gradient);
@@ -360,26 +359,27 @@ Status Rasterizer::BackwardOfSubject(const Subject& subject, const RenderGradien
   return {};
 }
 
-Result<SeenGradient> Rasterizer::BackwardToSeen(const CloudView& cloud, const RenderGradient& output_gradient) {
+Result<AppearanceGradient> Rasterizer::BackwardToAppearance(const CloudView& cloud,
+                                                            const RenderGradient& output_gradient) {
   if (!state_->kept) return NoPicture();
   const State::Kept& kept = *state_->kept;
   ANCHORSPLAT_RETURN_IF_ERROR(CheckCloud(cloud, kept.count, kept.sh_degree));
   ANCHORSPLAT_RETURN_IF_ERROR(CheckGradient(output_gradient, kept.intrinsics.width, kept.intrinsics.height));
   try {
     if (kept.on_gpu) {
-      const Status status = state_->BackwardToSeenOnGpu(output_gradient);
+      const Status status = state_->BackwardToAppearanceOnGpu(output_gradient);
       if (!status.ok()) {
         GiveUpGpu(status.error());
         state_->DrawAgainOnCpu({cloud});
       }
     }
-    if (!kept.on_gpu) state_->BackwardToSeenOnCpu(output_gradient);
+    if (!kept.on_gpu) state_->BackwardToAppearanceOnCpu(output_gradient);
   } catch (const std::bad_alloc&) {
     return NoMemory(kept.count);
   }
   const auto n = static_cast<size_t>(kept.count);
-  return SeenGradient{std::span(state_->gradients.data(), n), std::span(state_->projected.data(), n),
-                      std::span(state_->radii.data(), 2 * n)};
+  return AppearanceGradient{std::span(state_->gradients.data(), n), std::span(state_->projected.data(), n),
+                            std::span(state_->radii.data(), 2 * n)};
 }
 
 }  // namespace anchorsplat

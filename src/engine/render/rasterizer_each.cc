@@ -10,16 +10,16 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr uint64_t kBytesTogether = uint64_t{48} << 20;  // of pictures that are waited for at once
-constexpr uint64_t kPartTogether = 16;                   // at most of the run's GPU memory goes to them
-constexpr uint64_t kPartForPairs = 8;                    // and to the pairs of one
+constexpr uint64_t kBytesTogether = uint64_t{48} << 20;  // of pictures per wait
+constexpr uint64_t kPartTogether = 16;                   // denominator: their maximum share of the run's GPU memory
+constexpr uint64_t kPartForPairs = 8;                    // denominator: for the pairs of one picture
 constexpr int64_t kPairBytes = 16;
-constexpr int64_t kFewPairs = 1 << 16;  // there is always room for
+constexpr int64_t kFewPairs = 1 << 16;  // always fits
 
 }  // namespace
 
-// Room for the pairs of each picture: twice as many as there have been so far. 0: that is more than there should be.
-int64_t Rasterizer::State::PairsTogether(const StillCloud& cloud, const RenderOptions& options) const {
+// Pairs to allocate per picture: twice the maximum so far. 0: too many.
+int64_t Rasterizer::State::PairsTogether(const ConstantCloud& cloud, const RenderOptions& options) const {
   const int64_t most = cloud.most_pairs().value_or(0);
   const auto room = static_cast<int64_t>(std::min(MaxGpuMemoryOfRun() / kPartForPairs / kPairBytes,
                                                   gpu->device->adapter().max_binding / sizeof(uint32_t)));
@@ -28,9 +28,9 @@ int64_t Rasterizer::State::PairsTogether(const StillCloud& cloud, const RenderOp
   return wanted >= most ? wanted : 0;
 }
 
-size_t Rasterizer::State::CountTogether(StillCloud& cloud, std::span<const Camera> cameras,
+size_t Rasterizer::State::CountTogether(ConstantCloud& cloud, std::span<const Camera> cameras,
                                         const RenderOptions& options) {
-  // The first one tells how many pairs there are.
+  // The first picture gives the number of pairs.
   if (cameras.size() < 2 || !cloud.most_pairs() || OpenGpu() == nullptr) return 0;
   if (PairsTogether(cloud, options) == 0) return 0;
   if (const Result<GpuCloud*> there = Upload({cloud.view(), &cloud}); !there.ok() || !(*there)->resident()) return 0;
@@ -45,7 +45,7 @@ size_t Rasterizer::State::CountTogether(StillCloud& cloud, std::span<const Camer
   return count < 2 ? 0 : count;
 }
 
-Status Rasterizer::RenderEach(StillCloud& cloud, std::span<const Camera> cameras, const RenderOptions& options,
+Status Rasterizer::RenderEach(ConstantCloud& cloud, std::span<const Camera> cameras, const RenderOptions& options,
                               const std::function<Status(size_t, RenderOutput&)>& use) {
   state_->kept.reset();
   // Other pictures need the memory.
@@ -76,7 +76,7 @@ Status Rasterizer::RenderEach(StillCloud& cloud, std::span<const Camera> cameras
       for (size_t k = 0; k < count; ++k) {
         Camera& camera = from_origin[k];
         const float near = NearPlane(options, camera);
-        camera.world_to_camera = FromOrigin(camera.world_to_camera, cloud.view().origin);
+        camera.world_to_camera = RelativeToOrigin(camera.world_to_camera, cloud.view().origin);
         ShapeFor(camera, options, outputs[k]);
         pictures.push_back({.camera = camera, .near = near, .output = outputs[k]});
       }
@@ -89,7 +89,7 @@ Status Rasterizer::RenderEach(StillCloud& cloud, std::span<const Camera> cameras
     const Status drawn =
         there.ok() ? state_->gpu->DrawTogether(**there, pictures, options, state_->PairsTogether(cloud, options))
                    : Status(there.error());
-    if (!drawn.ok()) {  // one by one there may be room
+    if (!drawn.ok()) {  // they may fit one by one
       together = false;
       continue;
     }

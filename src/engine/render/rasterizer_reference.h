@@ -13,8 +13,9 @@
 #include "core/spherical_harmonics.h"
 #include "render/rasterizer.h"
 
-// The rasterizer in double precision: no tiles' lists, no blocks, one pixel at a time. It reads like the paper (Kerbl
-// et al. 2023) and gsplat's description of its kernels; slow on purpose. What render/ is tested against.
+// The rasterizer in double precision without tile lists or blocks, one pixel at a time: close to the paper (Kerbl et
+// al. 2023) and gsplat's description of its kernels, and deliberately slow. The reference that render/ is tested
+// against.
 namespace anchorsplat::reference {
 
 using Matrix3 = std::array<double, 9>;  // row-major
@@ -32,17 +33,17 @@ inline Matrix3 Transpose(const Matrix3& a) { return {a[0], a[3], a[6], a[1], a[4
 
 struct Splat {
   int64_t row;
-  float depth;                // the sort key of every 3DGS rasterizer is a float
+  float depth;                // all 3DGS rasterizers sort by a float
   double x, y, z;             // mean in pixels; camera z
   double xx, xy, yy;          // 2-D covariance, dilated, px²
   double a, b, c;             // conic
-  double opacity;             // compensated in modes that do so
+  double opacity;             // after compensation, in modes that have it
   double radius_x, radius_y;  // px
   int tile_x0, tile_y0, tile_x1, tile_y1;
   std::array<double, 3> rgb;
 };
 
-// Whether row i survives projection and culling; fills `out`.
+// Projects row i to `out`; false if it is culled.
 inline bool Project(const GaussianCloud& cloud, int64_t i, const Camera& camera, const RenderOptions& options,
                     Splat& out) {
   if (!IsUsable(cloud, i)) return false;
@@ -118,7 +119,7 @@ inline bool Project(const GaussianCloud& cloud, int64_t i, const Camera& camera,
   return true;
 }
 
-// All visible Gaussians, nearest first, those of the same depth by row.
+// All visible Gaussians, nearest first, ties by row.
 inline std::vector<Splat> ProjectAll(const GaussianCloud& cloud, const Camera& camera, const RenderOptions& options) {
   std::vector<Splat> splats;
   Splat splat{};
@@ -133,9 +134,9 @@ struct Pixel {
   std::array<double, 3> rgb{};
   double alpha = 0;
   double depth = 0;
-  int64_t last_row = -1;  // of the last Gaussian that was added
-  // How near, as a ratio, some α came to min_alpha and some T to min_transmittance: a pixel at a cut-off may fall to
-  // either side by rounding, and a comparison has to leave it out.
+  int64_t last_row = -1;  // of the last Gaussian added
+  // Smallest relative distance of an α to min_alpha or a T to min_transmittance: rounding decides pixels at a cut-off,
+  // so comparisons must exclude them.
   double margin = std::numeric_limits<double>::infinity();
 };
 

@@ -10,6 +10,7 @@
 #include "core/camera.h"
 #include "core/stopwatch.h"
 #include "render/bin.h"
+#include "render/constant_cloud.h"
 #include "render/gpu_cloud.h"
 #include "render/gpu_rasterizer.h"
 #include "render/gpu_rasterizer_backward.h"
@@ -18,40 +19,39 @@
 #include "render/projected_gaussian.h"
 #include "render/rasterizer.h"
 #include "render/spherical_harmonics.h"
-#include "render/still_cloud.h"
 
 namespace anchorsplat {
 
-// Only ever grows, so that a warm rasterizer does not allocate; the old contents are not kept.
+// Returns memory for `size` elements, growing the buffer if needed (contents are lost), so that a warm rasterizer does
+// not allocate.
 template <typename T>
 T* Room(Buffer<T>& buffer, int64_t size) {
   const size_t needed = static_cast<size_t>(size);
   if (buffer.size() < needed) {
-    buffer.clear();  // nothing to copy to the new place
+    buffer.clear();  // avoids copying
     buffer.resize(needed + needed / 8);
   }
   return buffer.data();
 }
 
-// What the first two steps of a picture are given; where their results go is left open.
+// Inputs of the first two steps of a picture; outputs are unset.
 ProjectParams ProjectInputs(const CloudView& cloud, const Camera& camera, float near, const RenderOptions& options);
 SphericalHarmonicsParams SphericalHarmonicsInputs(const CloudView& cloud, const Camera& camera,
                                                   const RenderOptions& options);
 
-// RenderOptions::min_transmittance, but no less than where T would lose its digits, from which the backward pass
-// recovers what it was in front.
-inline float LeastTransmittance(const RenderOptions& options) { return std::max(options.min_transmittance, 1e-30f); }
+// RenderOptions::min_transmittance, raised to where T keeps its precision, which the backward pass needs to recover T.
+inline float MinTransmittance(const RenderOptions& options) { return std::max(options.min_transmittance, 1e-30f); }
 
-// Gives the pictures the sizes of what is drawn.
+// Resizes the output images.
 void ShapeFor(const Camera& camera, const RenderOptions& options, RenderOutput& output);
 
-// What is drawn: arrays, or those of a splat that does not change, whose copy on a GPU is its own.
-struct Rasterizer::Subject {
+// The cloud to draw: arrays, or a constant cloud with its own GPU copy.
+struct Rasterizer::Source {
   const CloudView& cloud;
-  StillCloud* still = nullptr;
+  ConstantCloud* constant = nullptr;
 };
 
-// The buffers of a Rasterizer.
+// Buffers of a Rasterizer.
 struct Rasterizer::State {
   Buffer<ProjectedGaussian> projected;
   Buffer<TileRect> tiles, tiles_by_depth;
@@ -60,7 +60,7 @@ struct Rasterizer::State {
   Buffer<int64_t> visible_starts, tile_offsets, evaluations;
   RenderStatistics statistics;
 
-  // For the backward pass, which also needs most of the above.
+  // Data for the backward pass, which also needs most of the above.
   struct Kept {
     Pinhole intrinsics;
     Pose world_to_camera;
@@ -69,12 +69,12 @@ struct Rasterizer::State {
     RenderOptions options;
     int64_t count;
     int sh_degree;
-    bool on_gpu;  // by `gpu`, which has what the CPU would have below
+    bool on_gpu;  // drawn by `gpu`, which has the data that the CPU would have below
   };
-  std::optional<Kept> kept;  // where the last Render was asked to keep it
+  std::optional<Kept> kept;  // if the last Render had RenderOptions::gradient
   std::unique_ptr<GpuRasterizer> gpu;
-  GpuCloud gpu_cloud;                                   // what `gpu` drew last, unless that is a StillCloud's
-  std::unique_ptr<GpuRasterizerBackward> gpu_backward;  // of `gpu`, once it is needed
+  GpuCloud gpu_cloud;                                   // last cloud drawn by `gpu`, except constant clouds
+  std::unique_ptr<GpuRasterizerBackward> gpu_backward;  // for `gpu`, created on demand
   Buffer<float> transmittance;
   Buffer<int32_t> contributors, radii;
   Buffer<int64_t> slot_counts, slot_starts;
@@ -83,19 +83,19 @@ struct Rasterizer::State {
   Buffer<uint8_t> slot_touched;
   Buffer<double> tile_backgrounds;
 
-  // `gpu`, as the run has one now.
+  // Returns `gpu` for the run's current device.
   GpuRasterizer* OpenGpu();
-  // What is drawn, on it. Errors: of GpuCloud::Assign.
-  Result<GpuCloud*> Upload(const Subject& subject);
-  // A picture, by one or the other. False: not by the GPU, because the run has none, because it needs doubles, or
-  // because it failed, after which the run has none.
-  bool DrawOnGpu(const Subject& subject, const Camera& camera, float near, const RenderOptions& options,
+  // Uploads the cloud. Errors: those of GpuCloud::Assign.
+  Result<GpuCloud*> Upload(const Source& source);
+  // Draws a picture on the GPU or CPU. DrawOnGpu returns false if the run has no GPU, the picture needs doubles, or the
+  // GPU fails; the run then gives it up.
+  bool DrawOnGpu(const Source& source, const Camera& camera, float near, const RenderOptions& options,
                  RenderOutput& output);
   void DrawOnCpu(const CloudView& cloud, const Camera& camera, float near, const RenderOptions& options,
                  RenderOutput& output);
-  // How many of the cameras, from the first one on, can be drawn together on the GPU: 0, or at least two.
-  size_t CountTogether(StillCloud& cloud, std::span<const Camera> cameras, const RenderOptions& options);
-  int64_t PairsTogether(const StillCloud& cloud, const RenderOptions& options) const;
+  // How many of the leading cameras can be drawn together on the GPU: 0, or at least two.
+  size_t CountTogether(ConstantCloud& cloud, std::span<const Camera> cameras, const RenderOptions& options);
+  int64_t PairsTogether(const ConstantCloud& cloud, const RenderOptions& options) const;
 
   void DropGpu() {
     gpu_backward.reset();
@@ -109,24 +109,24 @@ struct Rasterizer::State {
   BinParams MakeBinParams(int64_t visible_total, const Pinhole& intrinsics, float min_alpha);
   void BinAndBlend(int64_t visible_total, const Camera& camera, const RenderOptions& options, RenderOutput& output,
                    Stopwatch& watch);
-  // How the sums of the tiles are to be added up after the last run of tiles.
+  // How to add up the sums of the last run of tiles.
   struct SlotsLeft {
     SlotsParams params;
     GradientSlots slots;
   };
-  // Background, and where there is more than one run of tiles, `gradients` and means2d_abs.
+  // Computes the background's gradient and, with several runs of tiles, `gradients` and means2d_abs.
   std::optional<SlotsLeft> BlendBackward(const RenderGradient& output_gradient, CloudGradient& gradient);
   void ProjectBackward(const std::optional<SlotsLeft>& left, const CloudView& cloud, const CoefficientStep* step,
                        CloudGradient& gradient);
-  Buffer<float> sh_gradients;  // [N,K,3] of the GPU, where they take a step
+  Buffer<float> sh_gradients;  // [N,K,3] from the GPU, if a step is taken
 
-  // What the GPU drew, once more by the CPU, which has then kept what it needs.
-  void DrawAgainOnCpu(const Subject& subject);
-  // Errors: of GpuRasterizerBackward. Then nothing has changed that cannot be calculated again.
-  Status BackwardOnGpu(const Subject& subject, const RenderGradient& output_gradient, const CoefficientStep* step,
+  // Redraws the GPU's picture on the CPU, with data for the backward pass.
+  void DrawAgainOnCpu(const Source& source);
+  // Errors: those of GpuRasterizerBackward. Nothing has changed then that cannot be recomputed.
+  Status BackwardOnGpu(const Source& source, const RenderGradient& output_gradient, const CoefficientStep* step,
                        CloudGradient& gradient);
-  Status BackwardToSeenOnGpu(const RenderGradient& output_gradient);
-  void BackwardToSeenOnCpu(const RenderGradient& output_gradient);
+  Status BackwardToAppearanceOnGpu(const RenderGradient& output_gradient);
+  void BackwardToAppearanceOnCpu(const RenderGradient& output_gradient);
 };
 
 }  // namespace anchorsplat

@@ -1,12 +1,11 @@
-// Exclusive sums of u32, in place, of any length up to 2^32: every block of 2048 by a workgroup of its own, then the
-// blocks' totals by one. What comes before item i is items[i] + items[scan.sums_at + i / 2048].
-// Compiled behind workgroup_sums.wgsl.
+// Exclusive sums of u32, in place, up to 2^32 items: each block of 2048 by a workgroup, then the blocks' totals by one.
+// The sum before item i is items[i] + items[scan.sums_at + i / 2048]. Appended to workgroup_sums.wgsl.
 
 struct Scan {
-  size_at: u32,   // how many items there are: `tables`·⌈sizes[size_at] / 2048⌉ or, where that is 0, sizes[size_at]
+  size_at: u32,   // number of items: `tables`·⌈sizes[size_at] / 2048⌉ or, if `tables` is 0, sizes[size_at]
   tables: u32,
-  sums_at: u32,   // where in `items` the blocks' totals lie
-  total_at: u32,  // where in `totals` the sum of all goes
+  sums_at: u32,   // offset of the blocks' totals in `items`
+  total_at: u32,  // index of the total in `totals`
 }
 @group(0) @binding(0) var<uniform> scan: Scan;
 @group(0) @binding(1) var<storage, read> sizes: array<u32>;

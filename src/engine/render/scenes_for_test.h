@@ -14,22 +14,22 @@
 #include "core/source_dir_for_test.h"
 #include "render/rasterizer.h"
 
-// Clouds and cameras that the tests of this room share.
+// Clouds and cameras for the tests of render/.
 namespace anchorsplat::test {
 
 struct SceneShape {
   int64_t gaussians = 500;
   int degree = 3;
-  double smallest = 0.005, largest = 0.3;  // scales, world units; the camera stands 3 units away
+  double smallest = 0.005, largest = 0.3;  // scales, world units; the camera is 3 units away
 };
 
-// Gaussians of all shapes in a ball of radius 1 and some around the camera.
+// Gaussians of all shapes in a ball of radius 1, and some around the camera.
 inline GaussianCloud RandomCloud(uint64_t seed, const SceneShape& shape = {}) {
   GaussianCloud cloud;
   cloud.Resize(shape.gaussians, shape.degree);
   Random random(seed);
   for (size_t i = 0; i < static_cast<size_t>(shape.gaussians); ++i) {
-    const double spread = i % 10 == 9 ? 4.0 : 1.0;  // every tenth anywhere: behind the camera, off the image
+    const double spread = i % 10 == 9 ? 4.0 : 1.0;  // every tenth anywhere, also behind the camera or off the image
     for (size_t a = 0; a < 3; ++a) {
       cloud.means[3 * i + a] = static_cast<float>(spread * random.Uniform(-1, 1));
       cloud.log_scales[3 * i + a] =
@@ -80,8 +80,8 @@ inline GaussianCloud OneGaussian(double x, double y, double z, double scale, dou
   return cloud;
 }
 
-// The two splats of examples/: binary little-endian PLY of exactly 62 floats per Gaussian in the INRIA order. Empty
-// when the file is not that.
+// Reads a splat of examples/: binary little-endian PLY with exactly 62 floats per Gaussian in INRIA's order. Empty
+// otherwise.
 inline GaussianCloud ReadExample(const std::string& name) {
   GaussianCloud cloud;
   std::ifstream file(SourceDirForTest().string() + "/examples/" + name + "/input.ply", std::ios::binary);

@@ -12,12 +12,12 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int64_t kAlmostNothing = 1000;  // one of so many Gaussians
+constexpr int64_t kAlmostNothing = 1000;  // 1 of 1,000 Gaussians
 
-// Gaussians along the view's axis.
+// Counts of Gaussians along the viewing axis.
 struct Depths {
   int64_t behind = 0, too_near = 0, in_range = 0, too_far = 0;
-  int64_t faint = 0, unusable = 0;  // of those in range: drawn by nobody
+  int64_t faint = 0, unusable = 0;  // in range, but not drawn
 };
 
 Depths CountDepths(const CloudView& cloud, const Camera& camera, double near, double far) {
@@ -40,7 +40,7 @@ Depths CountDepths(const CloudView& cloud, const Camera& camera, double near, do
 
 }  // namespace
 
-RenderOptions OptionsFor(const CloudView& cloud) {
+RenderOptions DisplayOptions(const CloudView& cloud) {
   RenderOptions options;
   options.mode = cloud.render_mode.value_or(RenderMode::kClassic);
   options.subject = FrameCloud(cloud);
@@ -52,13 +52,13 @@ float NearPlane(const RenderOptions& options, const Camera& camera) {
   if (!options.subject) return options.near_plane;
   const auto middle = camera.ToCamera(options.subject->target);
   const double distance = std::max(std::hypot(middle[0], middle[1], middle[2]), options.subject->radius);
-  // NaN and what floats cannot hold keep the plane as it is.
+  // NaN and overflow leave the plane unchanged.
   const auto share = static_cast<float>(std::min(double{kNearShare} * distance, double{options.near_plane}));
   return share >= std::numeric_limits<float>::min() ? share : options.near_plane;
 }
 
-std::string NothingToSee(const CloudView& cloud, const Camera& camera, const RenderOptions& options,
-                         std::optional<int64_t> drawn) {
+std::string EmptyPictureReason(const CloudView& cloud, const Camera& camera, const RenderOptions& options,
+                               std::optional<int64_t> drawn) {
   if (cloud.empty() || drawn.value_or(0) * kAlmostNothing >= cloud.size()) return {};
   const float near = NearPlane(options, camera);
   const Depths depths = CountDepths(cloud, camera, near, options.far_plane);

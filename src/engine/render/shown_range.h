@@ -10,20 +10,20 @@
 
 namespace anchorsplat {
 
-// How a splat is shown everywhere but in fits and trainings: in the mode that its file says (classic where it says
-// none), from kNear or, where that is nearer, kNearShare of the distance to it on, however far. So a scene looks the
-// same in metres, in kilometres and in the unit that a reconstruction happened to have.
-RenderOptions OptionsFor(const CloudView& cloud);
+// Options for displaying a splat, everywhere except fits and training: the mode stated by its file (default: classic),
+// from kNear or, if nearer, kNearShare of the distance to the splat, to infinity. So a scene looks the same in metres,
+// kilometres, or the arbitrary unit of a reconstruction.
+RenderOptions DisplayOptions(const CloudView& cloud);
 
-// The near plane of a picture: `options.near_plane` or, where there is a subject and that is nearer, kNearShare of the
-// distance to its middle, which counts as no less than its radius. World units along z, positive.
+// Near plane of a picture: `options.near_plane` or, if there is a subject and that is nearer, kNearShare of the
+// distance to its centre, taken as at least its radius. World units along z, positive.
 float NearPlane(const RenderOptions& options, const Camera& camera);
 
-// A sentence where a picture that shows `drawn` Gaussians (RenderStatistics::visible) has nothing in it, or where fewer
-// than one of a thousand Gaussians lie between its planes: camera and splat do not belong together, or have different
-// units. It names the view, says where the Gaussians are, and what to do. Empty when all is well. Without `drawn` only
-// the planes are looked at.
-std::string NothingToSee(const CloudView& cloud, const Camera& camera, const RenderOptions& options,
-                         std::optional<int64_t> drawn);
+// Explains an empty picture: a message if a picture with `drawn` Gaussians (RenderStatistics::visible) shows nothing,
+// or if fewer than 1 of 1,000 Gaussians lie between its planes, because camera and splat do not match or have different
+// units. It names the view, where the Gaussians are, and what to do. Empty if all is well. Without `drawn`, only the
+// planes are checked.
+std::string EmptyPictureReason(const CloudView& cloud, const Camera& camera, const RenderOptions& options,
+                               std::optional<int64_t> drawn);
 
 }  // namespace anchorsplat

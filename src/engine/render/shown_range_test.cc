@@ -37,9 +37,9 @@ Camera InUnit(Camera camera, double unit) {
 RenderOutput Shown(const GaussianCloud& cloud, const Camera& camera) {
   Rasterizer rasterizer;
   RenderOutput output;
-  const Status status = rasterizer.Render(cloud, camera, OptionsFor(cloud), output);
+  const Status status = rasterizer.Render(cloud, camera, DisplayOptions(cloud), output);
   EXPECT_TRUE(status.ok()) << status.error().message;
-  EXPECT_EQ(NothingToSee(cloud, camera, OptionsFor(cloud), rasterizer.statistics().visible), "");
+  EXPECT_EQ(EmptyPictureReason(cloud, camera, DisplayOptions(cloud), rasterizer.statistics().visible), "");
   return output;
 }
 
@@ -56,7 +56,7 @@ TEST(ShownRange, LargeScenesAreCutWhereFitsCutThem) {
   GaussianCloud cloud = RandomCloud(8, {.gaussians = 300});
   for (float& x : cloud.means) x *= 20;
   const Camera camera = InUnit(RandomCamera(8, 80, 60), 20);
-  EXPECT_EQ(NearPlane(OptionsFor(cloud), camera), kNear);
+  EXPECT_EQ(NearPlane(DisplayOptions(cloud), camera), kNear);
   RenderOutput plain;
   ASSERT_TRUE(Rasterizer().Render(cloud, camera, {}, plain).ok());
   EXPECT_EQ(Shown(cloud, camera).color.pixels, plain.color.pixels);
@@ -91,28 +91,29 @@ TEST(ShownRange, SaysWhyThereIsNothingToSee) {
   Camera camera = FrontCamera(16, 16, 16);
   camera.name = "lr/\x1b[2J";
   RenderOptions options;
-  std::string text = NothingToSee(cloud, camera, options, 0);
+  std::string text = EmptyPictureReason(cloud, camera, options, 0);
   EXPECT_THAT(text, HasSubstr("view lr/\\x1b[2J shows nothing of the 2,000 Gaussians: 2,000 before the near plane"));
   options.near_plane = 1e-4f;
-  EXPECT_EQ(NothingToSee(cloud, camera, options, 2000), "");
-  EXPECT_EQ(NothingToSee(cloud, camera, options, std::nullopt), "");
-  EXPECT_THAT(NothingToSee(cloud, camera, options, 0), HasSubstr("2,000 in range but beside the picture"));
+  EXPECT_EQ(EmptyPictureReason(cloud, camera, options, 2000), "");
+  EXPECT_EQ(EmptyPictureReason(cloud, camera, options, std::nullopt), "");
+  EXPECT_THAT(EmptyPictureReason(cloud, camera, options, 0), HasSubstr("2,000 in range but beside the picture"));
   GaussianCloud faint = cloud;
   for (float& logit : faint.opacity_logits) logit = -std::numeric_limits<float>::infinity();
-  EXPECT_THAT(NothingToSee(faint, camera, options, 0), HasSubstr("Gaussians: 2,000 less opaque than 1/255;"));
+  EXPECT_THAT(EmptyPictureReason(faint, camera, options, 0), HasSubstr("Gaussians: 2,000 less opaque than 1/255;"));
   for (size_t i = 0; i < 1000; ++i) faint.means[3 * i + 2] = -1;  // the faint ones are not those beside the picture
   for (size_t i = 1000; i < 2000; ++i) faint.opacity_logits[i] = 0;
-  EXPECT_THAT(NothingToSee(faint, camera, options, 0),
+  EXPECT_THAT(EmptyPictureReason(faint, camera, options, 0),
               HasSubstr("1,000 behind the camera, 1,000 in range but beside the picture"));
   options.far_plane = 2e-4f;
-  EXPECT_THAT(NothingToSee(cloud, camera, options, std::nullopt), HasSubstr("2,000 beyond the far plane (0.0002)"));
+  EXPECT_THAT(EmptyPictureReason(cloud, camera, options, std::nullopt),
+              HasSubstr("2,000 beyond the far plane (0.0002)"));
   options.far_plane = kNoFar;
   for (size_t i = 1; i < 2000; ++i) cloud.means[3 * i + 2] = -1;
-  text = NothingToSee(cloud, camera, options, 1);
+  text = EmptyPictureReason(cloud, camera, options, 1);
   EXPECT_THAT(text, HasSubstr("almost nothing"));
   EXPECT_THAT(text, HasSubstr("1,999 behind the camera, 1 in range"));
   cloud.means[5] = 0.005f;  // two of two thousand are some
-  EXPECT_EQ(NothingToSee(cloud, camera, options, 1), "");
+  EXPECT_EQ(EmptyPictureReason(cloud, camera, options, 1), "");
 }
 
 TEST(ShownRange, RefusesPlanesTheWrongWayRound) {

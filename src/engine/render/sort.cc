@@ -45,8 +45,8 @@ void SortCpu(const SortParams& p) {
       const auto [first, last] = PieceOf(p.count, p.chunks, c);
       for (int64_t i = first; i < last; ++i) ++histogram[((keys[i] - smallest) >> shift) & mask];
     });
-    // Where each chunk's share of each bucket starts: buckets first, then chunks, which is what makes it stable.
-    // This is done by one thread, so it goes along the chunks, several buckets at a time.
+    // Start of each chunk's part of each bucket: ordered by bucket, then chunk, which makes the sort stable.
+    // Single-threaded, so it iterates along chunks, several buckets at a time.
     uint32_t starts[kSortBuckets] = {};
     for (int64_t c = 0; c < p.chunks; ++c) {
       const uint32_t* histogram = p.histograms + c * kSortBuckets;

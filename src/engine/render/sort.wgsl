@@ -1,6 +1,6 @@
-// One pass of a stable radix sort of u32 keys with their rows, 4 bits: count the digits of every block of 2048, scan the
-// counts (render/scan.wgsl), scatter. Every item's place follows from the keys alone, so every device and every run
-// gives the same; how many items there are comes from a buffer, so the host need not know.
+// One pass of a stable radix sort of u32 keys with their rows, 4 bits: count digits per block of 2048, scan the counts
+// (render/scan.wgsl), scatter. Positions follow from the keys alone, so all devices and runs agree. The number of items
+// comes from a buffer, so the host need not know it.
 
 struct Sort {
   shift: u32,    // of the digit
@@ -14,7 +14,7 @@ struct Sort {
 @group(0) @binding(4) var<storage, read_write> keys_out: array<u32>;
 @group(0) @binding(5) var<storage, read_write> rows_out: array<u32>;
 @group(0) @binding(6) var<storage, read> places: array<u32>;        // [16, blocks], scanned
-@group(0) @binding(7) var<storage, read_write> counts: array<u32>;  // the same before
+@group(0) @binding(7) var<storage, read_write> counts: array<u32>;  // [16, blocks], unscanned
 
 const ITEMS = 8u;
 const BLOCK = 2048u;
@@ -38,8 +38,8 @@ fn sort_count(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
   if (lane < 16u && block < blocks) { counts[lane * blocks + block] = atomicLoad(&found[lane]); }
 }
 
-// How many items with each digit come before a thread's own: 16 counters of 16 bits, scanned over the threads.
-var<workgroup> low: array<vec4u, 256>;   // digits 0 … 7, two in a word
+// Number of items with each digit before a thread's own: 16 counters of 16 bits, scanned over threads.
+var<workgroup> low: array<vec4u, 256>;   // digits 0 … 7, two per word
 var<workgroup> high: array<vec4u, 256>;  // digits 8 … 15
 
 fn CountOf(digit: u32, below_8: vec4u, from_8: vec4u) -> u32 {
@@ -56,7 +56,7 @@ fn sort_scatter(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_i
   var below_8 = vec4u(0u);
   var from_8 = vec4u(0u);
   var keys: array<u32, 8>;
-  var ranks: array<u32, 8>;  // among the thread's own items of the same digit
+  var ranks: array<u32, 8>;  // among the thread's items of the same digit
   for (var k = 0u; k < ITEMS; k++) {
     if (first + k < size) {
       keys[k] = keys_in[first + k];

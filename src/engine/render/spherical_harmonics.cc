@@ -23,8 +23,8 @@ namespace anchorsplat {
 namespace HWY_NAMESPACE {
 namespace {
 
-// Σ_k Y_k·sh[k], the three channels side by side in one 128-bit register (whose fourth lane is the next coefficient's
-// red and ignored). The last coefficient is added apart: a fourth float behind it may not exist.
+// Σ_k Y_k·sh[k], with three channels in a 128-bit register (the fourth lane is the next coefficient's red, ignored).
+// The last coefficient is added separately, as a fourth float after it may not exist.
 HWY_INLINE void Sum(const ShBasisBatch& b, size_t j, int coefficients, const float* HWY_RESTRICT sh,
                     float* HWY_RESTRICT rgb) {
   const int last = coefficients - 1;
@@ -35,7 +35,7 @@ HWY_INLINE void Sum(const ShBasisBatch& b, size_t j, int coefficients, const flo
   }
 #else
   const hn::FixedTag<float, 4> d4;
-  auto even = hn::Zero(d4), odd = hn::Zero(d4);  // two chains: an addition has a latency of several cycles
+  auto even = hn::Zero(d4), odd = hn::Zero(d4);  // two chains, to hide the latency of additions
   int k = 0;
   for (; k + 1 < last; k += 2) {
     even = hn::MulAdd(hn::Set(d4, b.value[k][j]), hn::LoadU(d4, sh + 3 * k), even);
@@ -49,8 +49,8 @@ HWY_INLINE void Sum(const ShBasisBatch& b, size_t j, int coefficients, const flo
   for (int c = 0; c < 3; ++c) rgb[c] += b.value[last][j] * sh[3 * last + c];
 }
 
-// The same of coefficients that overflow a sum of floats: as bright as they say, but such that pictures can add some of
-// them up. False where a coefficient is not finite.
+// The same for coefficients that overflow a float sum: keeps the brightness, but small enough for pictures to add some.
+// False if a coefficient is not finite.
 bool SumOfHuge(const ShBasisBatch& b, size_t j, int coefficients, const float* sh, float* rgb) {
   constexpr double kBrightest = 1e30;
   bool finite = true;
@@ -82,14 +82,14 @@ void EvaluateChunk(const SphericalHarmonicsParams& p, int64_t chunk) {
       bool finite = true;
       for (int c = 0; c < 3; ++c) {
         rgb[c] += 0.5f;
-        finite = finite && std::abs(rgb[c]) <= std::numeric_limits<float>::max();  // false for NaN, too
+        finite = finite && std::abs(rgb[c]) <= std::numeric_limits<float>::max();  // also false for NaN
       }
       if (!finite && !SumOfHuge(b, j, coefficients, p.sh + i * p.stride, rgb)) {
         p.tiles[i] = TileRect{};
         continue;
       }
       for (int c = 0; c < 3; ++c) p.projected[i].rgb[c] = std::max(rgb[c], 0.0f);
-      visible[kept++] = i;  // kept ≤ begin + j: never overtakes the reading
+      visible[kept++] = i;  // kept ≤ begin + j: never overtakes reading
     }
   }
   p.visible_counts[chunk] = static_cast<int32_t>(kept);

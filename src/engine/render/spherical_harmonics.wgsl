@@ -1,4 +1,4 @@
-// Colours of the visible Gaussians of a block of the cloud: the twin of render/spherical_harmonics.cc.
+// Colours of the visible Gaussians of a block of the cloud: counterpart of render/spherical_harmonics.cc.
 
 @group(0) @binding(1) var<storage, read> means: array<f32>;
 @group(0) @binding(2) var<storage, read> sh: array<f32>;
@@ -20,7 +20,7 @@ fn color(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) l
   if (rects[row].y == 0u) { return; }
   let degree = view.flags.z;
   let at = i * view.counts.w;
-  // What floats cannot add up, and what is not finite, is for the CPU to judge.
+  // Overflowing sums and non-finite values are left to the CPU.
   var largest = 0u;
   for (var k = 0u; k < 3u * (degree + 1u) * (degree + 1u); k++) { largest = max(largest, Magnitude(sh[at + k])); }
   if (largest > bitcast<u32>(1e30f)) {

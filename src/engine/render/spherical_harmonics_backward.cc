@@ -27,11 +27,11 @@ namespace anchorsplat {
 namespace HWY_NAMESPACE {
 namespace {
 
-constexpr ptrdiff_t kAhead = 24;  // Gaussians that are fetched ahead: rows are large and not all of them are needed
+constexpr ptrdiff_t kAhead = 24;  // prefetch distance in Gaussians: rows are large and not all are needed
 constexpr int kFloatsPerLine = 16;
-constexpr size_t kFloatsAtMost = 3 * kShCoefficientsAtMost;  // of a row
+constexpr size_t kFloatsAtMost = 3 * kShCoefficientsAtMost;  // per row
 
-// ∂Y_k/∂(x, y, z) of the formulas as they stand, at unit directions; where it is 0 everywhere, it is not written.
+// ∂Y_k/∂(x, y, z) at unit directions; terms that are 0 everywhere are omitted.
 struct BasisSlopes {
   alignas(64) float slope[3][kShCoefficientsAtMost][kShBatch];
 };
@@ -76,7 +76,7 @@ HWY_INLINE void Spread(const ShBasisBatch& b, size_t j, int coefficients, const 
     for (int c = 0; c < 3; ++c) out[3 * k + c] = b.value[k][j] * g[c];
   }
 #else
-  // Four floats at a time, of which the next coefficient's store overwrites the fourth.
+  // Four floats at a time; the next store overwrites the fourth.
   const hn::FixedTag<float, 4> d4;
   const auto g4 = hn::Load(d4, g);
   for (int k = 0; k < last; ++k) hn::StoreU(hn::Mul(hn::Set(d4, b.value[k][j]), g4), d4, out + 3 * k);
@@ -84,8 +84,8 @@ HWY_INLINE void Spread(const ShBasisBatch& b, size_t j, int coefficients, const 
   for (int c = 0; c < 3; ++c) out[3 * last + c] = b.value[last][j] * g[c];
 }
 
-// The coefficients along the slopes, Σ_k ∇Y_k·sh[k], for x, y and z: each a number nobody reads, red, green and blue.
-// Y_0 has no slope, and most others none along one or two axes.
+// Coefficients along the slopes, Σ_k ∇Y_k·sh[k], for x, y and z: each an unused number, then red, green and blue. Y_0
+// has no slope, and most others none along one or two axes.
 HWY_INLINE void AlongSlopes(const BasisSlopes& s, size_t j, int degree, const float* HWY_RESTRICT sh,
                             float* HWY_RESTRICT out) {
 #if HWY_TARGET == HWY_SCALAR
@@ -95,7 +95,7 @@ HWY_INLINE void AlongSlopes(const BasisSlopes& s, size_t j, int degree, const fl
   };
   const auto one = [&](size_t k, size_t a) { add(a, k); };
 #else
-  // Reads from the float before the coefficient's red, so that nothing behind the last coefficient is touched.
+  // Reads from one float before the coefficient's red, so as not to read past the last coefficient.
   const hn::FixedTag<float, 4> d4;
   using V4 = hn::Vec<decltype(d4)>;
   V4 x = hn::Zero(d4), y = hn::Zero(d4), z = hn::Zero(d4);
@@ -117,16 +117,16 @@ HWY_INLINE void AlongSlopes(const BasisSlopes& s, size_t j, int degree, const fl
 #endif
 }
 
-// Those of a batch that have a gradient.
+// Gaussians of a batch with a gradient.
 struct Taught {
   size_t count = 0;
   int64_t rows[kShBatch];
   alignas(64) float g[kShBatch][4];         // ∂L/∂rgb, 0
-  alignas(64) float along[3][kShBatch][4];  // of AlongSlopes, by axis
+  alignas(64) float along[3][kShBatch][4];  // from AlongSlopes, by axis
   alignas(64) float means[3][kShBatch];     // ∂L/∂mean through the direction
 };
 
-// One register of Gaussians: ∂L/∂direction, and through the normalisation: what points along the ray changes nothing.
+// A register of Gaussians: ∂L/∂direction, then through the normalisation, which removes the component along the ray.
 HWY_INLINE void DirectionLanes(const ShBasisBatch& b, size_t j, Taught& t) {
   const ShTag d;
   ShVector red, green, blue, unread;
@@ -145,7 +145,7 @@ HWY_INLINE void DirectionLanes(const ShBasisBatch& b, size_t j, Taught& t) {
   hn::Store(hn::Mul(inverse, hn::NegMulAdd(radial, z, along_z)), d, t.means[2] + j);
 }
 
-// Rows [first, last), at most a batch, of which [visible, end) are not culled. `out` is the gradient of row `first`.
+// Rows [first, last), at most a batch, of which [visible, end) are visible. `out`: gradient of row `first`.
 void BackwardRows(const SphericalHarmonicsBackwardParams& p, int64_t first, int64_t last, const int32_t* visible,
                   const int32_t* end, float* out) {
   const size_t lanes = hn::Lanes(ShTag());
@@ -158,7 +158,7 @@ void BackwardRows(const SphericalHarmonicsBackwardParams& p, int64_t first, int6
     for (int c = 0; c < 3; ++c) g[c] = projected.rgb[c] > 0 ? p.gradients[i].rgb[c] : 0.0f;
     g[3] = 0;
     t.rows[t.count] = i;
-    // Hidden ones have no gradient, and they are many.
+    // Occluded Gaussians have no gradient, and there are many.
     t.count += !(g[0] == 0 && g[1] == 0 && g[2] == 0);
   }
   ShBasisBatch b;
@@ -177,7 +177,7 @@ void BackwardRows(const SphericalHarmonicsBackwardParams& p, int64_t first, int6
   };
   for (size_t j = 0; j < t.count; ++j) {
     const int64_t i = t.rows[j];
-    // Of dense splats nearly all are needed; fetched one by one, as many at once wait for each other.
+    // In dense splats nearly all are needed; fetched one by one, they would wait for each other.
     if (const int64_t next = i + kAhead; next < p.count) {
       for (int k = 0; k < 3 * coefficients; k += kFloatsPerLine) hwy::Prefetch(p.sh + next * p.stride + k);
     }
@@ -200,7 +200,7 @@ void BackwardRows(const SphericalHarmonicsBackwardParams& p, int64_t first, int6
   }
 }
 
-// Rows of coefficients that take a step, some at a time.
+// Applies a step to rows of coefficients in pieces.
 struct Steps {
   Steps(const CoefficientStep& own_step, int64_t own_stride) : step(own_step), stride(own_stride) {
     runs.stride = stride;
@@ -215,12 +215,12 @@ struct Steps {
   const CoefficientStep& step;
   int64_t stride;
   AdamRuns runs{};
-  alignas(64) float rates[kFloatsAtMost * kAdamLanesAtMost];
+  alignas(64) float rates[kFloatsAtMost * kMaxAdamLanes];
 };
 
-// Rows [first, last), of which `gradient` is.
+// Rows [first, last), with their `gradient`.
 void StepRows(Steps& s, int64_t first, int64_t last, const float* gradient) {
-  const bool whole = s.step.columns == s.stride;  // then all rows are one run
+  const bool whole = s.step.columns == s.stride;  // all rows form one run
   s.runs.gradient = gradient;
   s.runs.runs = whole ? 1 : last - first;
   s.runs.count = whole ? (last - first) * s.stride : s.step.columns;

@@ -1,20 +1,20 @@
-// The twin of spherical_harmonics_backward.cc. Compiled behind view.wgsl. All arrays begin with the first Gaussian of the
+// Counterpart of spherical_harmonics_backward.cc. Appended to view.wgsl. Arrays start at the first Gaussian of the
 // dispatch.
 //
-// A workgroup is 64 Gaussians. Their rows of coefficients go through workgroup memory, so that reading and writing them
-// go along memory; in between, a thread has a row.
+// A workgroup is 64 Gaussians. Rows of coefficients pass through workgroup memory, for contiguous reads and writes; in
+// between, each thread has a row.
 
 @group(0) @binding(1) var<storage, read> seen: array<Seen>;
-@group(0) @binding(2) var<storage, read> sums: array<vec4f>;  // [N,12] of gather_slots.wgsl
+@group(0) @binding(2) var<storage, read> sums: array<vec4f>;  // [N,12] from gather_slots.wgsl
 @group(0) @binding(3) var<storage, read> means: array<f32>;
 @group(0) @binding(4) var<storage, read> sh: array<f32>;
-@group(0) @binding(5) var<storage, read_write> mean_gradients: array<f32>;  // the part through the direction is added
+@group(0) @binding(5) var<storage, read_write> mean_gradients: array<f32>;  // adds the part through the direction
 @group(0) @binding(6) var<storage, read_write> sh_gradients: array<f32>;
 
 const ROWS = 64u;
-const ROW = 49u;  // floats, odd for the sake of the banks
+const ROW = 49u;  // floats; odd, to avoid bank conflicts
 var<workgroup> rows: array<f32, ROWS * ROW>;
-var<workgroup> taught: array<u32, ROWS>;  // 1 where a row has a gradient: hidden ones have none, and they are many
+var<workgroup> taught: array<u32, ROWS>;  // 1 if a row has a gradient; many occluded ones have none
 
 const SH0 = 0.28209479177387814;
 const SH1 = 0.48860251190291992;
@@ -28,16 +28,16 @@ const SH3_4 = 1.865881662950577;
 const SH3_5 = 1.1195289977703462;
 const SH3_6 = 1.4453057213202769;
 
-// By their bits: comparing floats may pass over NaN.
+// Compares bits, as float comparisons may ignore NaN.
 fn IsSome(g: vec3f) -> bool { return any((bitcast<vec3u>(g) & vec3u(0x7fffffffu)) != vec3u(0u)); }
 
-// ∂L/∂(Y_k's factor): the coefficient along the colour's gradient.
+// ∂L/∂(factor of Y_k): the coefficient along the colour's gradient.
 fn Along(row: u32, k: u32, g: vec3f) -> f32 {
   let at = row + 3u * k;
   return rows[at] * g.x + (rows[at + 1u] * g.y + rows[at + 2u] * g.z);
 }
 
-// Coefficient k's gradient takes its place.
+// Replaces coefficient k by its gradient.
 fn Put(row: u32, k: u32, basis: f32, g: vec3f) {
   let at = row + 3u * k;
   rows[at] = basis * g.x;
@@ -57,7 +57,7 @@ fn spherical_harmonics_backward(@builtin(workgroup_id) group: vec3u, @builtin(lo
 
   var g = vec3f(0.0);
   if (thread < count) {
-    // Nothing flows through a channel that is clamped at 0. Rows of culled Gaussians hold anything, but have no sums.
+    // Channels clamped at 0 pass no gradient. Rows of culled Gaussians are undefined, but have no sums.
     g = vec3f(sums[3u * i + 1u].zw, sums[3u * i + 2u].x);
     if (IsSome(g)) { g = select(vec3f(0.0), g, seen[i].rgb > vec3f(0.0)); }
   }
@@ -65,7 +65,7 @@ fn spherical_harmonics_backward(@builtin(workgroup_id) group: vec3u, @builtin(lo
   taught[thread] = select(0u, 1u, learns);
   workgroupBarrier();
 
-  // As many rows side by side as threads reach.
+  // As many rows at once as threads can cover.
   let side_by_side = ROWS / stride;
   let own_row = thread / stride;
   let column = thread % stride;
@@ -78,7 +78,7 @@ fn spherical_harmonics_backward(@builtin(workgroup_id) group: vec3u, @builtin(lo
 
   if (learns) {
     let row = thread * ROW;
-    // The difference in two steps: far from the world's origin floats have no digits left for it.
+    // Subtract in two steps: far from the origin floats lack the precision.
     let mean = vec3f(means[3u * i], means[3u * i + 1u], means[3u * i + 2u]);
     let offset = (mean - view.center.xyz) - view.center_low.xyz;
     let inverse = 1.0 / sqrt(dot(offset, offset));
@@ -134,7 +134,7 @@ fn spherical_harmonics_backward(@builtin(workgroup_id) group: vec3u, @builtin(lo
     }
     Put(row, 0u, SH0, g);
     if (degree > 0u) {
-      // What points along the ray changes nothing.
+      // The component along the ray has no effect.
       let along = inverse * (slope - dot(slope, direction) * direction);
       for (var k = 0u; k < 3u; k++) { mean_gradients[3u * i + k] += along[k]; }
     }

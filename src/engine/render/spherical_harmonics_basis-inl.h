@@ -1,5 +1,5 @@
-// The spherical harmonics at a batch of directions, for both directions of the colour stage. Compiled once per
-// instruction set, as <hwy/highway.h>.
+// Spherical harmonics of a batch of directions, for forward and backward. Compiled once per instruction set, as
+// <hwy/highway.h>.
 
 #if defined(ANCHORSPLAT_RENDER_SPHERICAL_HARMONICS_BASIS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef ANCHORSPLAT_RENDER_SPHERICAL_HARMONICS_BASIS_INL_H_
@@ -28,25 +28,25 @@ constexpr size_t kShBatch = 64;
 constexpr size_t kShCoefficientsAtMost = 16;
 
 struct ShBasisBatch {
-  alignas(64) float direction[3][kShBatch];  // from the camera; EvaluateBasis makes its length 1
+  alignas(64) float direction[3][kShBatch];  // from the camera; EvaluateBasis normalises it
   alignas(64) float inverse_distance[kShBatch];
   alignas(64) float value[kShCoefficientsAtMost][kShBatch];  // Y_k
 };
 
-// Directions to the n ≤ kShBatch means at mean(j).
+// Loads directions to the n ≤ kShBatch means at mean(j).
 template <typename Mean>
 HWY_INLINE void LoadDirections(size_t n, const Mean& mean, const std::array<double, 3>& center, ShBasisBatch& b) {
   for (size_t j = 0; j < n; ++j) {
     const float* m = mean(j);
-    // The difference in double: far from the world's origin floats have no digits left for it.
+    // Subtract in double: far from the origin floats lack the precision.
     for (size_t a = 0; a < 3; ++a) b.direction[a][j] = static_cast<float>(m[a] - center[a]);
   }
-  for (size_t j = n; j < (n + 15) / 16 * 16; ++j) {  // lanes that nobody reads
+  for (size_t j = n; j < (n + 15) / 16 * 16; ++j) {  // unused lanes
     for (size_t a = 0; a < 3; ++a) b.direction[a][j] = 1.0f;
   }
 }
 
-// Y_0 … of the degree at one register of directions.
+// Evaluates Y_0 … of the degree for one register of directions.
 HWY_INLINE void EvaluateBasis(int degree, size_t j, ShBasisBatch& b) {
   const ShTag d;
   const auto c = [d](float value) HWY_ATTR { return hn::Set(d, value); };

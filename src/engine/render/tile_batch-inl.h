@@ -1,5 +1,5 @@
-// What both directions of blending do with a tile: read its Gaussians batch by batch and find the 4×4-pixel blocks that
-// each one reaches, with the exponential that α is made of. Compiled once per instruction set, as <hwy/highway.h>.
+// Shared by forward and backward blending of a tile: reads its Gaussians in batches and finds the 4×4-pixel blocks that
+// each one reaches, and computes α. Compiled once per instruction set, as <hwy/highway.h>.
 
 #if defined(ANCHORSPLAT_RENDER_TILE_BATCH_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef ANCHORSPLAT_RENDER_TILE_BATCH_INL_H_
@@ -33,19 +33,19 @@ using M = hn::Mask<D>;
 
 constexpr size_t kBlocksPerSide = kTile / kBlock;
 constexpr size_t kBlocks = kBlocksPerSide * kBlocksPerSide;
-constexpr size_t kPixels = kBlock * kBlock;  // of a block
+constexpr size_t kPixels = kBlock * kBlock;  // per block
 constexpr size_t kLanesAtMost = 16;
 
-// Gaussians of a tile's list taken at once: few enough that all scratch stays in the L1 cache. Coordinates are relative
-// to the tile's upper left corner, so floats are fine enough on any image.
+// A batch of Gaussians of a tile's list, small enough that all scratch stays in the L1 cache. Coordinates are relative
+// to the tile's upper left corner, so floats are precise for any image size.
 template <size_t kSize>
 struct TileBatch {
-  // Gaussian by Gaussian, in pieces that are copied whole: to fetch them costs more than to blend a few pixels.
-  // Blending takes one number for all of its pixels, which is as quick from here as from columns.
+  // Per Gaussian, in pieces that are copied whole: loading them costs more than blending a few pixels. Blending
+  // broadcasts single numbers, which is as fast from here as from columns.
   alignas(64) float at[kSize][2];     // x, y
   alignas(64) float shape[kSize][4];  // u_xx, u_xy, u_yy, log2_opacity
   alignas(64) float seen[kSize][4];   // red, green, blue, depth
-  // Which of the batch each block looks at, in order; room for the register that is stored at the end.
+  // Indices of the batch per block, in order, with room for the last register stored.
   alignas(64) int32_t lists[kBlocks][kSize + kLanesAtMost];
   size_t list_sizes[kBlocks];
 };
@@ -53,7 +53,7 @@ struct TileBatch {
 struct PixelOffsets {
   alignas(64) float x[kPixels], y[kPixels];
 };
-constexpr PixelOffsets MakePixelOffsets() {  // pixel centres of a block, row by row
+constexpr PixelOffsets MakePixelOffsets() {  // pixel centres of a block, row-major
   PixelOffsets o{};
   for (size_t i = 0; i < kPixels; ++i) {
     o.x[i] = static_cast<float>(i % kBlock) + 0.5f;
@@ -63,11 +63,11 @@ constexpr PixelOffsets MakePixelOffsets() {  // pixel centres of a block, row by
 }
 constexpr PixelOffsets kPixelOffsets = MakePixelOffsets();
 
-// 2^x for −126 ≤ x ≤ 0, relative error below 2e-7 (Chebyshev-weighted fit); anything for other x.
+// 2^x for −126 ≤ x ≤ 0, relative error below 2e-7 (Chebyshev-weighted fit); undefined for other x.
 HWY_INLINE V Exp2(V x) {
   const D d;
   const DI di;
-  // Adding 1.5·2^23 leaves the nearest integer in the low mantissa bits, from where it is shifted into the exponent.
+  // Adding 1.5·2^23 puts the nearest integer in the low mantissa bits, which are shifted into the exponent.
   const V magic = hn::Set(d, 12582912.0f);
   const V shifted = hn::Add(x, magic);
   const V f = hn::Sub(x, hn::Sub(shifted, magic));  // −½ … ½
@@ -80,16 +80,16 @@ HWY_INLINE V Exp2(V x) {
   return hn::BitCast(d, hn::Add(hn::BitCast(di, p), hn::ShiftLeft<23>(hn::BitCast(di, shifted))));
 }
 
-// Asks for the Gaussians of rows[0, n), which are next, while those before them are at work.
+// Prefetches the Gaussians of rows[0, n) while the previous ones are processed.
 HWY_INLINE void Fetch(const ProjectedGaussian* projected, const int32_t* rows, size_t n) {
   for (size_t j = 0; j < n; ++j) hwy::Prefetch(projected + rows[j]);
 }
 
-// Copies the Gaussians of rows[0, n) and fills the last register up with ones that hit nothing.
+// Copies the Gaussians of rows[0, n) and pads the last register with ones that hit nothing.
 template <size_t kSize>
 void ReadBatch(const ProjectedGaussian* projected, const int32_t* rows, size_t n, double tile_x, double tile_y,
                TileBatch<kSize>& t) {
-  constexpr size_t kAhead = 32;  // far enough for the L3 cache: the rows of a tile lie anywhere
+  constexpr size_t kAhead = 32;  // enough for L3 latency, as the rows of a tile are scattered
   for (size_t j = 0; j < std::min(n, kAhead); ++j) hwy::Prefetch(projected + rows[j]);
   for (size_t j = 0; j < n; ++j) {
     if (j + kAhead < n) hwy::Prefetch(projected + rows[j + kAhead]);
@@ -107,8 +107,8 @@ void ReadBatch(const ProjectedGaussian* projected, const int32_t* rows, size_t n
   }
 }
 
-// log2 α of Gaussian j of the batch at pixel centres of the tile. Both directions must decide alike about every pixel,
-// so there is one place where this is calculated.
+// log2 α of Gaussian j of the batch at pixel centres of the tile. Computed only here, as forward and backward must
+// agree on every pixel.
 template <size_t kSize>
 HWY_INLINE V Log2Alpha(const TileBatch<kSize>& t, size_t j, V dx, V dy) {
   const D d;
@@ -119,8 +119,8 @@ HWY_INLINE V Log2Alpha(const TileBatch<kSize>& t, size_t j, V dx, V dy) {
 
 HWY_INLINE V ClampTo(V x, V low, V high) { return hn::Min(hn::Max(x, low), high); }
 
-// Makes each block's list: those of the batch whose ellipse α = min_alpha reaches a pixel centre of the block. Finished
-// blocks get none.
+// Builds each block's list: Gaussians whose ellipse α = min_alpha reaches a pixel centre of the block. Finished blocks
+// get none.
 template <size_t kSize>
 void ListBlocks(float log2_min_alpha, size_t n, const bool* finished, TileBatch<kSize>& t) {
   const D d;
@@ -140,7 +140,7 @@ void ListBlocks(float log2_min_alpha, size_t n, const bool* finished, TileBatch<
     const V slope = hn::Mul(half, u_yy);
     // Height of the rightmost point of the ellipse; the leftmost one is opposite.
     const V rightmost = hn::Div(hn::Mul(height, shear), hn::Sqrt(hn::MulAdd(shear, shear, hn::Mul(slope, slope))));
-    // Against rounding here; who is listed for nothing is dropped by the exact test of its pixels.
+    // Margin against rounding; false positives are dropped by the exact test per pixel.
     const V margin = hn::MulAdd(hn::Set(d, 4e-6f), hn::Add(hn::Abs(x), hn::Abs(y)), hn::Set(d, 0.01f));
     const M hits = hn::Ge(reach2, zero);
     const VI index = hn::Iota(di, static_cast<int32_t>(j));
@@ -162,7 +162,7 @@ void ListBlocks(float log2_min_alpha, size_t n, const bool* finished, TileBatch<
         const float first_x = static_cast<float>(column * kBlock) + 0.5f;
         const M reaches = hn::And(hn::Ge(right, hn::Set(d, first_x)), hn::Le(left, hn::Set(d, first_x + kBlock - 1)));
         const auto hit = hn::RebindMask(di, hn::And(in_row, reaches));
-        // Compress and store apart: the fused instruction is microcode on some processors.
+        // Compress and store separately: the fused instruction is microcoded on some processors.
         hn::StoreU(hn::Compress(index, hit), di, t.lists[block] + t.list_sizes[block]);
         t.list_sizes[block] += hn::CountTrue(di, hit);
       }

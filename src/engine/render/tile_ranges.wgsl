@@ -1,17 +1,16 @@
-// The ranges of all tiles from their counts, by one workgroup: what the host does where it looks on between the counts
-// and the lists (GpuRasterizer::ListRun). Where there is more than there is room for, or a Gaussian that only the CPU can
-// project, all ranges are empty and nothing is listed. What is written down tells the host afterwards.
-// Compiled behind workgroup_sums.wgsl.
+// Ranges of all tiles from their counts, by one workgroup: what GpuRasterizer::ListRun does on the host. If memory does
+// not suffice, or a Gaussian can only be projected by the CPU, all ranges are empty and nothing is listed; the report
+// tells the host afterwards. Appended to workgroup_sums.wgsl.
 
 struct TileRanges {
   tiles: u32,
-  pairs: u32,      // room for them
-  slots: u32,      // room for the sums of the gradient: of all tiles of all rectangles
+  pairs: u32,      // capacity
+  slots: u32,      // capacity for gradient sums: all tiles of all rectangles
   report_at: u32,
 }
 @group(0) @binding(0) var<uniform> room: TileRanges;
-@group(0) @binding(1) var<storage, read> tile_counts: array<u32>;  // [T+1], the last one of what is cut (render/bin.wgsl)
-@group(0) @binding(2) var<storage, read> unusual: array<u32>;      // [0]: how many
+@group(0) @binding(1) var<storage, read> tile_counts: array<u32>;  // [T+1], the last counts cut tiles (render/bin.wgsl)
+@group(0) @binding(2) var<storage, read> unusual: array<u32>;      // [0]: count
 @group(0) @binding(3) var<storage, read_write> sizes: array<u32>;
 @group(0) @binding(4) var<storage, read_write> ranges: array<u32>;
 @group(0) @binding(5) var<storage, read_write> reports: array<vec4u>;  // visible, pairs, unusual, cut

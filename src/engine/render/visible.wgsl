@@ -1,4 +1,4 @@
-// The visible Gaussians, in the order of their rows, with the bits of their depths: what is sorted.
+// Lists the visible Gaussians in row order, with the bits of their depths as sort keys.
 
 struct Visible {
   count: u32,    // Gaussians of the cloud
@@ -6,7 +6,7 @@ struct Visible {
 }
 @group(0) @binding(0) var<uniform> visible: Visible;
 @group(0) @binding(1) var<storage, read> rects: array<vec2u>;
-@group(0) @binding(2) var<storage, read_write> marks: array<u32>;  // 1 where it is visible
+@group(0) @binding(2) var<storage, read_write> marks: array<u32>;  // 1 if visible
 @group(0) @binding(3) var<storage, read> places: array<u32>;       // the same, scanned
 @group(0) @binding(4) var<storage, read> seen: array<Seen>;
 @group(0) @binding(5) var<storage, read_write> keys: array<u32>;
@@ -23,7 +23,7 @@ fn list_visible(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_i
   let i = GroupNumber(group) * 256u + lane;
   if (i >= visible.count || rects[i].y == 0u) { return; }
   let to = places[i] + places[visible.sums_at + i / 2048u];
-  // Depths are positive, so their bits sort like they do.
+  // Depths are positive, so their bits sort like floats.
   keys[to] = bitcast<u32>(seen[i].depth);
   rows[to] = i;
 }

@@ -1,12 +1,12 @@
 var<workgroup> sums: array<u32, 256>;
 
-// No further than the largest number.
+// Saturating.
 fn Sum(a: u32, b: u32) -> u32 {
   let sum = a + b;
   return select(sum, 0xffffffffu, sum < a);
 }
 
-// Exclusive sums of one number per thread; `sums` ends as the inclusive ones.
+// Exclusive sums of one number per thread; `sums` receives the inclusive ones.
 fn SumBefore(lane: u32, own: u32) -> u32 {
   sums[lane] = own;
   workgroupBarrier();

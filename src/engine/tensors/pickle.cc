@@ -13,13 +13,13 @@ namespace anchorsplat {
 
 namespace {
 
-// Bounds on what hostile bytes may make us hold. A checkpoint of 541 tensors has a pickle of 0.1 MB and 10,000 values.
+// Bounds on the memory of hostile pickles. A checkpoint of 541 tensors has a pickle of 0.1 MB and 10,000 values.
 constexpr size_t kMaxPickleBytes = size_t{32} << 20;
-constexpr size_t kMaxPickleValues = size_t{1} << 20;  // also of stack entries and marks
+constexpr size_t kMaxPickleValues = size_t{1} << 20;  // also bounds stack entries and marks
 constexpr size_t kMaxTensors = size_t{1} << 17;
 constexpr size_t kMaxArguments = 8;
 
-// Pickle's stack machine. Opcodes as Python's pickletools documents them.
+// Pickle's stack machine; opcodes as in Python's pickletools.
 class PickleMachine {
  public:
   PickleMachine(std::span<const std::byte> bytes, const std::string& where, size_t base)
@@ -54,7 +54,7 @@ class PickleMachine {
   template <typename T>
   Status Read(T& value) {
     if (!Has(sizeof value)) return Bad("the pickle ends within an opcode");
-    value = LoadLittle<T>(bytes_.data() + at_);
+    value = LoadLittleEndian<T>(bytes_.data() + at_);
     at_ += sizeof value;
     return {};
   }
@@ -150,7 +150,7 @@ class PickleMachine {
   // --- memo ---
   Status Remember(uint64_t slot) {
     if (Available() < 1) return Underflow();
-    // Python numbers its slots one by one, so a slot far beyond the values made so far is no pickle of Python's.
+    // Python numbers memo slots consecutively, so a slot far beyond the current values was not written by Python.
     if (slot > 2 * document_.values.size() + 16) return Bad(Cat("pickle memo slot ", slot, " is out of line"));
     if (slot >= memo_.size()) memo_.resize(static_cast<size_t>(slot) + 1, -1);
     if (memo_[static_cast<size_t>(slot)] < 0) ++memo_used_;
@@ -172,7 +172,7 @@ class PickleMachine {
   }
 
   // --- containers ---
-  // Adds items to the list or the key-value pairs to the dictionary on top of the stack.
+  // Appends items to the list, or key-value pairs to the dictionary, on top of the stack.
   Status Extend(PickleKind kind, const std::vector<int32_t>& items) {
     if (Available() < 1) return Underflow();
     PickleValue& target = Value(stack_.back());
@@ -239,7 +239,7 @@ class PickleMachine {
     return {};
   }
 
-  // A tuple of counts, for shapes and strides.
+  // A tuple of non-negative integers: a shape or strides.
   bool ReadCounts(int32_t index, std::vector<int64_t>& counts) {
     const PickleValue& tuple = Value(index);
     if (tuple.kind != PickleKind::kTuple || tuple.items.size() > kMaxTensorRank) return false;
@@ -273,7 +273,7 @@ class PickleMachine {
                      kMaxTensorRank));
     }
     if (arguments.size() > required) {
-      // Conjugate and negative views would need their values changed.
+      // Conjugate and negative views would need other values.
       const PickleValue& metadata = Value(arguments[required]);
       if (metadata.kind != PickleKind::kNone && !(metadata.kind == PickleKind::kDict && metadata.items.empty())) {
         return Bad("a tensor with metadata (a conjugate or negative view)");
@@ -290,7 +290,7 @@ class PickleMachine {
     if (!arguments.empty()) {
       const PickleValue& pairs = Value(arguments[0]);
       if (arguments.size() > 1 || pairs.kind != PickleKind::kList) return Bad("an OrderedDict of something else");
-      // Python writes such a list where it is used, once; one that is used again and again would grow without bound.
+      // Python writes such a list once, where it is used; one reused again and again would grow without bound.
       copied_pairs_ += pairs.items.size();
       if (copied_pairs_ > kMaxPickleValues) return Bad(Cat("OrderedDicts of more than ", kMaxPickleValues, " pairs"));
       for (const int32_t index : pairs.items) {
@@ -315,7 +315,7 @@ class PickleMachine {
     if (Value(arguments_index).items.size() > kMaxArguments) {
       return Bad(Cat("a call of \"", callee->module, ".", callee->name, "\" with too many arguments"));
     }
-    const std::vector<int32_t> arguments = Value(arguments_index).items;  // a copy: Make() moves the values
+    const std::vector<int32_t> arguments = Value(arguments_index).items;  // copied, as Make() moves the values
     switch (callee->role) {
       case PickleRole::kOrderedDict:
         return MakeOrderedDict(arguments);
@@ -337,8 +337,8 @@ class PickleMachine {
     }
   }
 
-  // Attributes of an object. OrderedDict has them for `_metadata`, module versions that no tensor depends on; NumPy's
-  // types for their byte order.
+  // Attributes of an object: `_metadata` of OrderedDict (module versions, irrelevant to tensors), byte order of NumPy
+  // types.
   Status Build() {
     if (Available() < 2) return Underflow();
     Pop();

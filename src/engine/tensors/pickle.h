@@ -13,8 +13,8 @@
 
 namespace anchorsplat {
 
-// A pickle as torch.save writes it, read as *data*: nothing is imported and nothing is called. Of Python's objects only
-// None, bools, numbers, strings, tuples, lists, dictionaries, PyTorch's tensors and NumPy's numbers exist here.
+// Reads pickles of torch.save as *data*: nothing is imported or called. The only Python objects are None, bools,
+// numbers, strings, tuples, lists, dictionaries, PyTorch tensors and NumPy numbers.
 
 enum class PickleKind : uint8_t {
   kNone,
@@ -25,31 +25,31 @@ enum class PickleKind : uint8_t {
   kText,     // text
   kTuple,    // items
   kList,     // items
-  kDict,     // items: key, value, key, value … in order of insertion; OrderedDict too
-  kGlobal,   // an allowed class, function or dtype that is mentioned, not used
+  kDict,     // items: key, value, key, value … in insertion order; also OrderedDict
+  kGlobal,   // a reference to an allowed class, function or dtype
   kStorage,  // integer: index in PickleDocument::storages
   kTensor,   // integer: index in PickleDocument::tensors
-  kNumpy,    // a number or a type of NumPy, or their bytes, as learning rates are: nothing that weights depend on
+  kNumpy,    // a NumPy number, type or their bytes (learning rates, for example); weights never depend on it
 };
 
 struct PickleValue {
   PickleKind kind = PickleKind::kNone;
   int64_t integer = 0;
   double real = 0;
-  std::string_view text;       // points into the pickle's bytes
-  std::vector<int32_t> items;  // indices in PickleDocument::values; the graph may share values and even have cycles
+  std::string_view text;       // points into the pickle
+  std::vector<int32_t> items;  // indices in PickleDocument::values, which may be shared or cyclic
 };
 
-// The bytes that a tensor looks at, stored elsewhere in the file.
+// Storage of tensors, elsewhere in the file.
 struct PickleStorage {
   std::string_view key;
   TensorType type = TensorType::kUint8;
-  bool untyped = false;  // torch.storage.UntypedStorage: `elements` are bytes, each tensor says its own type
+  bool untyped = false;  // torch.storage.UntypedStorage: `elements` are bytes, and each tensor has its own type
   int64_t elements = 0;  // ≥ 0
 };
 
-// Shape and strides have the same length (at most kMaxTensorRank) and no negative number; whether they fit into the
-// storage is not checked here.
+// `shape` and `strides` have equal length (≤ kMaxTensorRank) and no negative values. Whether they fit the storage is
+// not checked here.
 struct PickleTensor {
   int32_t storage = 0;
   TensorType type = TensorType::kFloat32;
@@ -68,12 +68,11 @@ struct PickleDocument {
   size_t size = 0;   // bytes up to and including STOP
 };
 
-// Runs the pickle at the start of `bytes` (protocols 2 to 5, binary opcodes). `where` begins every message ("x.pth:
-// data.pkl"), `base` is added to the byte positions in them.
+// Runs the pickle at the start of `bytes` (protocols 2 to 5, binary opcodes). `where` starts every message ("x.pth:
+// data.pkl"); `base` is added to byte positions in messages.
 //
-// Errors (kBadFile): a global that is not on the list of tensor parts, by name; an opcode that torch.save does not
-// write; a stack or memo that does not hold what an opcode needs; text that is not UTF-8; more than a million values or
-// 131,072 tensors.
+// Errors (kBadFile): a global that is not allowed (named); an opcode that torch.save does not write; a stack or memo
+// entry that does not fit its opcode; invalid UTF-8; more than a million values or 131,072 tensors.
 Result<PickleDocument> ReadPickle(std::span<const std::byte> bytes, const std::string& where, size_t base = 0);
 
 }  // namespace anchorsplat

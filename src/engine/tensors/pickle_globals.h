@@ -14,10 +14,10 @@ enum class PickleRole {
   kStorageType,
   kUntypedStorage,
   kDtype,
-  kNumpy,  // makes a PickleKind::kNumpy
+  kNumpy,  // gives a PickleKind::kNumpy
 };
 
-// A name of Python that a checkpoint may mention. None is imported or called: each stands for a shape of data.
+// A Python name allowed in checkpoints. None is imported or called: each stands for a form of data.
 struct PickleGlobal {
   std::string_view module;
   std::string_view name;
@@ -25,7 +25,7 @@ struct PickleGlobal {
   TensorType type = TensorType::kUint8;  // of storage types and dtypes
 };
 
-// The name's entry in the list of all that is allowed, or null.
+// The entry of an allowed name, or null.
 const PickleGlobal* FindPickleGlobal(std::string_view module, std::string_view name);
 
 }  // namespace anchorsplat

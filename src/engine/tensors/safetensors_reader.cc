@@ -15,7 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr uint64_t kMaxHeaderBytes = 100'000'000;  // of the format's own reference reader
+constexpr uint64_t kMaxHeaderBytes = 100'000'000;  // limit of the reference reader
 constexpr size_t kMaxRank = 32;
 
 struct DtypeName {
@@ -30,7 +30,7 @@ constexpr DtypeName kDtypes[] = {
     {"BOOL", TensorType::kBool},
 };
 
-// One member of the header, as the JSON has it.
+// One member of the JSON header.
 struct HeaderTensor {
   std::string name;
   std::optional<TensorType> type;
@@ -38,8 +38,8 @@ struct HeaderTensor {
   std::optional<std::vector<int64_t>> data_offsets;
 };
 
-// Takes the header apart while it is parsed, so that memory grows with the tensors and not with what hostile JSON
-// nests. What is expected next follows from the depth and the last key:
+// Parses the header with SAX callbacks, so that memory grows with the number of tensors, not with hostile nesting.
+// Depth and the last key determine what is expected:
 // {"name": {"dtype": "F32", "shape": [..], "data_offsets": [b, e]}, "__metadata__": {"key": "text"}}.
 class HeaderHandler : public nlohmann::json_sax<json> {
  public:
@@ -130,20 +130,20 @@ class HeaderHandler : public nlohmann::json_sax<json> {
   std::string key_;
   std::unordered_set<std::string> names_;
   std::unordered_set<std::string> members_;
-  std::vector<int64_t>* list_ = nullptr;  // the list that is being read
+  std::vector<int64_t>* list_ = nullptr;  // the list being read
 };
 
 }  // namespace
 
 bool LooksLikeSafetensors(std::span<const std::byte> beginning) {
   if (beginning.size() < 9 || beginning[8] != std::byte{'{'}) return false;
-  return LoadLittle<uint64_t>(beginning.data()) <= kMaxHeaderBytes;
+  return LoadLittleEndian<uint64_t>(beginning.data()) <= kMaxHeaderBytes;
 }
 
 Result<TensorFileContents> ReadSafetensors(std::span<const std::byte> bytes, const std::string& file) {
   const auto bad = [&](const std::string& what) { return Error{ErrorCode::kBadFile, Cat(file, ": ", what)}; };
   if (!LooksLikeSafetensors(bytes)) return bad("is not a safetensors file");
-  const auto header_bytes = LoadLittle<uint64_t>(bytes.data());
+  const auto header_bytes = LoadLittleEndian<uint64_t>(bytes.data());
   if (header_bytes > bytes.size() - 8) {
     return bad(Cat("is cut off: its header has ", header_bytes, " bytes, the file ", bytes.size()));
   }
@@ -182,7 +182,7 @@ Result<TensorFileContents> ReadSafetensors(std::span<const std::byte> bytes, con
     ranges.emplace_back(begin, end);
     contents.tensors.push_back(std::move(entry));
   }
-  // The format demands that the tensors tile the data: what is in no tensor could hide anything.
+  // The format requires tensors to tile the data; bytes in no tensor could hide anything.
   std::sort(ranges.begin(), ranges.end());
   int64_t expected = 0;
   for (const auto& [begin, end] : ranges) {

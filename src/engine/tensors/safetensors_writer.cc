@@ -72,7 +72,7 @@ Status WriteSafetensors(const std::filesystem::path& path, std::span<const Tenso
                         const std::map<std::string, std::string>& metadata, const WriteOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(Check(path, tensors, metadata));
 
-  // Bytes are laid out by falling element size, so each tensor starts at a multiple of its own element size.
+  // Sorted by decreasing element size, each tensor starts at a multiple of its element size.
   std::vector<size_t> layout(tensors.size());
   std::iota(layout.begin(), layout.end(), size_t{0});
   std::stable_sort(layout.begin(), layout.end(),

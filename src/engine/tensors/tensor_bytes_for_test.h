@@ -10,7 +10,7 @@
 #include "core/source_dir_for_test.h"
 #include "io/file_bytes_for_test.h"
 
-// Bytes for the tests of tensor files: files of the repository, and zip archives, pickles and safetensors made by hand.
+// For tests of tensor files: files in testdata, and builders of zip archives, pickles and safetensors.
 namespace anchorsplat::tensor_bytes {
 
 inline std::string ReadTestFile(const std::string& name) {
@@ -45,7 +45,7 @@ inline std::string MakeZip(const std::vector<std::pair<std::string, std::string>
          std::string(2, '\0');
 }
 
-// A checkpoint with this pickle and `storage` as data/0.
+// A checkpoint with this pickle and one storage, data/0.
 inline std::string MakeCheckpoint(const std::string& pickle, const std::string& storage = std::string(16, '\0')) {
   return MakeZip({{"x/data.pkl", pickle}, {"x/byteorder", "little"}, {"x/data/0", storage}});
 }

@@ -13,9 +13,9 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int64_t kChecksumChunk = int64_t{1} << 20;  // bytes that one thread adds up; part of what the checksum is
+constexpr int64_t kChecksumChunk = int64_t{1} << 20;  // bytes per task; part of the checksum's definition
 
-// Arrays are added up in chunks of their own, side by side, because a checkpoint has gigabytes.
+// Arrays are hashed in parallel chunks, because checkpoints have gigabytes.
 void AddBytes(std::span<const std::byte> bytes, Fingerprint& print) {
   const int64_t size = std::ssize(bytes);
   std::vector<uint64_t> chunks(static_cast<size_t>((size + kChecksumChunk - 1) / kChecksumChunk));
@@ -30,7 +30,7 @@ void AddBytes(std::span<const std::byte> bytes, Fingerprint& print) {
   print.Add(chunks);
 }
 
-// With its length, so that no text can stand for two.
+// Includes the length, so that different texts cannot collide when joined.
 void AddText(const std::string& text, Fingerprint& print) { print.Add(Cat(text.size(), ':', text)); }
 
 Result<std::string> ChecksumOf(const std::map<std::string, std::string>& metadata,

@@ -10,17 +10,16 @@
 
 namespace anchorsplat {
 
-// States that a run goes on from say what their bytes add up to: a flipped bit in them would otherwise be optimised
-// into the result. The sum is a Fingerprint (core/fingerprint.h) of all tensors, with names, types and shapes, and of
-// the metadata but for the sum itself.
+// Checksum of saved state, without which a flipped bit would be optimised into the result. It is a Fingerprint
+// (core/fingerprint.h) of all tensors with names, types and shapes, and of the metadata except the checksum.
 inline constexpr const char* kChecksumKey = "checksum";
 
-// `metadata` with the checksum of it and of `tensors`, for WriteSafetensors, which has to get the tensors in this
-// order. Errors (kBadFile): out of memory for a tensor that is not contiguous.
+// Adds the checksum of `metadata` and `tensors`, for WriteSafetensors with the tensors in the same order. Errors
+// (kBadFile): out of memory for a tensor that is not contiguous.
 Result<std::map<std::string, std::string>> WithChecksum(std::map<std::string, std::string> metadata,
                                                         std::span<const TensorEntry> tensors);
 
-// Reads the whole file. Errors (kBadFile): it has no checksum, or another one than its contents: it is damaged.
+// Verifies the checksum by reading the whole file. Errors (kBadFile): no checksum, or damaged contents.
 Status VerifyChecksum(const TensorFile& file);
 
 }  // namespace anchorsplat

@@ -36,7 +36,7 @@ TEST(TensorChecksum, FindsEveryFlippedBit) {
   const std::string whole = FileBytes(folder / "state");
   ASSERT_EQ(ProblemOf(whole), "");
   // What fills the header up to 64 bytes means nothing.
-  const size_t data = 8 + LoadLittle<uint64_t>(reinterpret_cast<const std::byte*>(whole.data())),
+  const size_t data = 8 + LoadLittleEndian<uint64_t>(reinterpret_cast<const std::byte*>(whole.data())),
                filling = whole.rfind('}', data) + 1;
   for (size_t bit = 0; bit < 8 * whole.size(); ++bit) {
     if (bit / 8 >= filling && bit / 8 < data) continue;

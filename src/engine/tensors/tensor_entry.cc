@@ -100,8 +100,9 @@ Result<Buffer<T>> Allocate(const TensorEntry& entry, int64_t count) {
 template <typename Stored, typename T, typename Convert>
 void ConvertAll(const TensorEntry& entry, Buffer<T>& out, Convert&& convert) {
   ParallelFor(0, static_cast<int64_t>(out.size()), kTensorGrain, [&](int64_t begin, int64_t end) {
-    ForElements(entry, begin, end,
-                [&](int64_t i, const std::byte* at) { out[static_cast<size_t>(i)] = convert(LoadLittle<Stored>(at)); });
+    ForElements(entry, begin, end, [&](int64_t i, const std::byte* at) {
+      out[static_cast<size_t>(i)] = convert(LoadLittleEndian<Stored>(at));
+    });
   });
 }
 
@@ -170,7 +171,7 @@ std::vector<int64_t> RowMajorStrides(std::span<const int64_t> shape) {
 }
 
 std::optional<int64_t> CountElements(std::span<const int64_t> shape) {
-  // The product of the non-zero extents must fit too, or strides would overflow for an empty tensor.
+  // The product of non-zero dimensions must fit too, or strides of an empty tensor could overflow.
   int64_t count = 1;
   bool is_empty = false;
   for (const int64_t extent : shape) {
@@ -270,7 +271,7 @@ Result<Buffer<std::byte>> CopyContiguous(const TensorEntry& entry) {
 Status CheckFinite(std::string_view name, std::span<const float> values) {
   for (size_t block = 0; block < values.size(); block += 4096) {
     const size_t end = std::min(values.size(), block + 4096);
-    // Whole numbers without branches: the compiler vectorises it, so every weight can be checked at start.
+    // Branch-free integer code, which the compiler vectorises: every weight can be checked at start.
     bool all_finite = true;
     for (size_t i = block; i < end; ++i) {
       all_finite &= (std::bit_cast<uint32_t>(values[i]) & 0x7f800000u) != 0x7f800000u;

@@ -16,14 +16,14 @@ namespace anchorsplat {
 
 namespace {
 
-// Bounds against graphs that name few bytes very often. A training checkpoint with optimiser state has some thousands
-// of values, five levels deep.
+// Bounds against object graphs that refer to few bytes very often. A training checkpoint with optimiser state has some
+// thousands of values, five levels deep.
 constexpr int kMaxNesting = 32;
 constexpr size_t kMaxVisits = size_t{1} << 18;
 constexpr size_t kMaxNameBytes = 1024;
-// A tensor with strides of 0 has more elements than its storage; this many are allowed when it does.
+// Tensors with strides of 0 can have more elements than their storage; this many are allowed.
 constexpr int64_t kMaxRepeatedElements = int64_t{1} << 20;
-// All tensors together may be this many times the size of the file: room for shared weights, not for a bomb.
+// Limit on all tensors together, relative to the file size: allows shared weights but no bombs.
 constexpr uint64_t kMaxSharing = 16;
 
 std::string_view Characters(std::span<const std::byte> bytes) {
@@ -33,7 +33,7 @@ std::string_view Characters(std::span<const std::byte> bytes) {
 // Bytes of each storage by key.
 using StorageBytes = std::unordered_map<std::string_view, std::span<const std::byte>>;
 
-// Turns the pickled graph into named tensors and scalars.
+// Converts the pickled object graph into named tensors and scalars.
 class ContentsBuilder {
  public:
   ContentsBuilder(const PickleDocument& document, const StorageBytes& storages, size_t file_size,
@@ -85,7 +85,7 @@ class ContentsBuilder {
       case PickleKind::kGlobal:
       case PickleKind::kStorage:
       case PickleKind::kNumpy:
-        return {};  // nothing that a reader of weights could use
+        return {};  // nothing that readers of weights use
     }
     return {};
   }
@@ -96,7 +96,7 @@ class ContentsBuilder {
     if (key.kind != PickleKind::kText) {
       return Bad(Cat("the dictionary \"", Printable(path), "\" has a key that is neither text nor a whole number"));
     }
-    // The one wrapper that training scripts agree on: {"state_dict": …, "epoch": …}.
+    // The usual wrapper of training scripts: {"state_dict": …, "epoch": …}.
     if (depth == 0 && key.text == "state_dict" && Value(member).kind == PickleKind::kDict) {
       return Visit(member, "", depth + 1);
     }
@@ -143,7 +143,7 @@ class ContentsBuilder {
     const auto stored = static_cast<int64_t>(bytes.size() / item);
     entry.data = bytes.data();
     if (*elements > 0) {
-      // The last element is the farthest, since strides are not negative; every step is checked before it is taken.
+      // The last element is the farthest, as strides are not negative. Every step is checked for overflow.
       int64_t last = tensor.offset;
       bool inside = last < stored;
       for (size_t d = 0; d < tensor.shape.size() && inside; ++d) {
@@ -183,7 +183,7 @@ bool LooksLikeTorchZip(std::span<const std::byte> beginning) {
 }
 
 bool LooksLikeTorchLegacy(std::span<const std::byte> beginning) {
-  // PROTO and its version. Whose pickle it is, the magic number behind it says; the reader wants to name what is wrong.
+  // PROTO and its version. The magic number that follows identifies PyTorch; the reader reports anything else.
   return beginning.size() >= 2 && beginning[0] == std::byte{0x80} && beginning[1] >= std::byte{2} &&
          beginning[1] <= std::byte{5};
 }
@@ -191,14 +191,14 @@ bool LooksLikeTorchLegacy(std::span<const std::byte> beginning) {
 Result<TensorFileContents> ReadTorchZip(std::span<const std::byte> bytes, const std::string& file) {
   const auto bad = [&](const std::string& what) { return Error{ErrorCode::kBadFile, Cat(file, ": ", what)}; };
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<ZipEntry> entries, ReadZipDirectory(bytes, file));
-  for (const ZipEntry& entry : entries) {  // tensors are used where they lie
+  for (const ZipEntry& entry : entries) {  // tensors are used in place
     if (entry.method != 0) {
       return Error{ErrorCode::kBadFile, Cat(file, ": zip entry \"", Printable(std::string(entry.name)),
                                             "\" is compressed (method ", entry.method, "), torch.save only stores")};
     }
   }
 
-  // The root folder has the file's name as it was when it was saved.
+  // The root folder is named after the file as saved.
   std::string_view root;
   bool found_root = false;
   for (const ZipEntry& entry : entries) {
@@ -275,7 +275,7 @@ Result<TensorFileContents> ReadTorchLegacy(std::span<const std::byte> bytes, con
       return bad(at, Cat("storage \"", Printable(std::string(key.text)), "\" is not one of the pickle's"));
     }
     if (bytes.size() - at < 8) return bad(at, "the file is cut off before a storage");
-    const auto elements = LoadLittle<uint64_t>(bytes.data() + at);
+    const auto elements = LoadLittleEndian<uint64_t>(bytes.data() + at);
     const auto item = static_cast<uint64_t>(ItemSize(found->second->type));
     at += 8;
     if (elements > (bytes.size() - at) / item) {

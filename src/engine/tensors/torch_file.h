@@ -9,8 +9,8 @@
 
 namespace anchorsplat {
 
-// Readers behind TensorFile for what torch.save writes; entries point into `bytes`, `file` begins every message.
-// Rules for names and the list of errors stand at TensorFile.
+// Readers of torch.save's formats for TensorFile, which documents names and errors. Entries point into `bytes`; `file`
+// starts every message.
 
 bool LooksLikeTorchZip(std::span<const std::byte> beginning);     // "PK…"
 bool LooksLikeTorchLegacy(std::span<const std::byte> beginning);  // a pickle
@@ -18,8 +18,8 @@ bool LooksLikeTorchLegacy(std::span<const std::byte> beginning);  // a pickle
 // The zip container: `<root>/data.pkl` and one entry `<root>/data/<key>` per storage.
 Result<TensorFileContents> ReadTorchZip(std::span<const std::byte> bytes, const std::string& file);
 
-// The container before PyTorch 1.6: five pickles one after the other (magic number, version, facts about the machine,
-// the object, the storages' keys), then per key the number of elements (int64) and the elements.
+// The container before PyTorch 1.6: five consecutive pickles (magic number, version, machine properties, the object,
+// storage keys), then per key the number of elements (int64) and the elements.
 Result<TensorFileContents> ReadTorchLegacy(std::span<const std::byte> bytes, const std::string& file);
 
 }  // namespace anchorsplat

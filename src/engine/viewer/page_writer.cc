@@ -53,10 +53,10 @@ std::string ScriptJson(const Json& json) {
 // What the page is told of a splat, without where its data are. The page's world begins at `origin`.
 Json SplatJson(const ViewerSplat& splat, const QuantizedCloud& q, const WorldOrigin& origin) {
   const Framing framing = FrameCloud(*splat.cloud);
-  std::array<double, 3> center = FromOrigin(splat.cloud->origin, origin);
+  std::array<double, 3> center = RelativeToOrigin(splat.cloud->origin, origin);
   for (size_t k = 0; k < 3; ++k) center[k] += q.center[k];
   const Json subject = {
-      {"target", FromOrigin(framing.target, origin)}, {"radius", framing.radius}, {"half", framing.half}};
+      {"target", RelativeToOrigin(framing.target, origin)}, {"radius", framing.radius}, {"half", framing.half}};
   const RenderMode mode = splat.cloud->render_mode.value_or(RenderMode::kClassic);
   return Json{{"name", splat.name},
               {"fileBytes", splat.file_bytes ? Json(*splat.file_bytes) : Json()},
@@ -125,7 +125,7 @@ Result<Json> AddPicture(const std::filesystem::path& path, const std::string& id
 Result<Json> AddView(const ViewerView& view, const WorldOrigin& origin, size_t index,
                      std::vector<DataElement>& elements) {
   const Pinhole& k = view.camera.intrinsics;
-  const Pose pose = FromOrigin(view.camera.world_to_camera, origin);
+  const Pose pose = RelativeToOrigin(view.camera.world_to_camera, origin);
   Json picture;
   if (!view.picture.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(picture, AddPicture(view.picture, Cat("picture-", index), elements));

@@ -92,8 +92,8 @@ Result<Capture> OpenCapture(const std::string& name, const fs::path& project, co
   WorldOrigin back = views.origin;
   for (double& x : back) x = -x;
   std::vector<std::pair<Camera, bool>> all;  // and whether it is held out
-  for (const Camera& camera : views.train) all.emplace_back(FromOrigin(camera, back), false);
-  for (const Camera& camera : views.held_out) all.emplace_back(FromOrigin(camera, back), true);
+  for (const Camera& camera : views.train) all.emplace_back(RelativeToOrigin(camera, back), false);
+  for (const Camera& camera : views.held_out) all.emplace_back(RelativeToOrigin(camera, back), true);
   std::ranges::stable_sort(all, {}, [](const auto& view) -> const std::string& { return view.first.name; });
   for (const auto& [camera, held_out] : all) {
     if (held_out) capture.held_out.push_back(capture.views.size());

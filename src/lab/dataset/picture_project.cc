@@ -137,7 +137,7 @@ Status WritePictures(const Camera& source, const fs::path& high, const fs::path&
                      "for that")};
   }
   const Image& image = picture.image;
-  if (source.image.extension() == ".png" && source.photograph.lens.IsStraight() && source.photograph.orientation == 1) {
+  if (source.image.extension() == ".png" && source.photograph.lens.IsIdentity() && source.photograph.orientation == 1) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string bytes, ReadFileBytes(source.image, kMaxPictureBytes));
     ANCHORSPLAT_RETURN_IF_ERROR(WriteWholeFile(high, bytes, write.overwrite));
   } else {

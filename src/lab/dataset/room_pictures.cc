@@ -288,7 +288,7 @@ Texture BookSpinesPicture(uint64_t seed) {
         Cat(first[random.Below(std::ssize(first))], " ", second[random.Below(std::ssize(second))]);
     const std::string author = authors[random.Below(std::ssize(authors))];
     const int scale = random.Below(2) == 0 ? 4 : 5;
-    DrawText(spine, 100, (kThick - 7 * scale) / 2, FittingText(title, 580, scale), scale, foil);
+    DrawText(spine, 100, (kThick - 7 * scale) / 2, TruncatedText(title, 580, scale), scale, foil);
     DrawText(spine, 720, (kThick - 21) / 2, author, 3, foil);
     const int column = book % (kBookSpines / 2) * kThick, row = book / (kBookSpines / 2) * kLong;
     for (int c = 0; c < 3; ++c) {

@@ -145,7 +145,7 @@ Result<Scene> Scene::Open(const SceneEntry& entry) {
   const std::vector<fs::path> pictures = {high / "images"};
   for (const Camera& camera : cameras.cameras) {
     Camera view = camera;
-    view.intrinsics = intrinsics.begin()->second.straight;
+    view.intrinsics = intrinsics.begin()->second.undistorted;
     view.photograph = intrinsics.begin()->second.photograph;
     view.image = FindPicture(pictures, camera.name);
     scene.high_views_.push_back(std::move(view));

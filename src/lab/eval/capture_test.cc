@@ -153,7 +153,7 @@ TEST(Capture, EveryRowIsKeptAsSoonAsItIsMeasured) {
       *OpenCapturedObject({"ball", folder / "captures/ball"}, kQuick, folder / "out/objects/ball/fit");
   RenderOutput output;
   Rasterizer rasterizer;
-  ASSERT_TRUE(rasterizer.Render(object.low, object.LowCamera(8), OptionsFor(object.low), output).ok());
+  ASSERT_TRUE(rasterizer.Render(object.low, object.LowCamera(8), DisplayOptions(object.low), output).ok());
   Clamp01(output.color);
   Image repeated(64, 48, 3);
   for (int c = 0; c < 3; ++c) {

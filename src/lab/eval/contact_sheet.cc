@@ -47,7 +47,7 @@ void Paste(Image& canvas, const Image& tile, int left, int top) {
 }
 
 // As much of a text as fits into a column.
-std::string Fitting(const std::string& text) { return FittingText(text, kTileSide, kTextScale, ""); }
+std::string Fitting(const std::string& text) { return TruncatedText(text, kTileSide, kTextScale, ""); }
 
 // Whose the objects are, in lines of at most `width` pixels: each text once, with the names of its objects where there
 // are several.

@@ -23,9 +23,9 @@
 #include "model/model_method.h"
 #include "model/published/enhance_with_published.h"
 #include "reading/reading_model.h"
+#include "render/constant_cloud.h"
 #include "render/rasterizer.h"
 #include "render/shown_range.h"
-#include "render/still_cloud.h"
 #include "tensors/tensor_file.h"
 #include "upscale/enlarge_picture.h"
 #include "upscale/upscaler.h"
@@ -80,10 +80,10 @@ EvalMethod Enlarged(const std::string& name, const std::string& settings, const 
   return {name, settings, [enlarge](const MethodTask& task) -> Result<MethodViews> {
             const BenchmarkObject& object = task.object;
             const auto rasterizer = std::make_shared<Rasterizer>();
-            const auto still = std::make_shared<StillCloud>(object.low);
+            const auto still = std::make_shared<ConstantCloud>(object.low);
             MethodViews views;
             views.render = [&object, rasterizer, still, enlarge](size_t view) -> Result<Image> {
-              RenderOptions options = OptionsFor(object.low);
+              RenderOptions options = DisplayOptions(object.low);
               options.background = object.background;
               RenderOutput output;
               ANCHORSPLAT_RETURN_IF_ERROR(rasterizer->Render(*still, object.LowCamera(view), options, output));
@@ -424,9 +424,9 @@ Result<std::optional<NamedMethod>> ParseDefault(const std::string& word, const s
 
 MethodViews SplatViews(const BenchmarkObject& object, GaussianCloud cloud) {
   struct State {
-    explicit State(GaussianCloud splat) : cloud(std::move(splat)), options(OptionsFor(cloud)) {}
+    explicit State(GaussianCloud splat) : cloud(std::move(splat)), options(DisplayOptions(cloud)) {}
     GaussianCloud cloud;
-    StillCloud still{cloud};
+    ConstantCloud still{cloud};
     Rasterizer rasterizer;
     RenderOptions options;
     bool warned = false;  // of views with nothing in them: one is enough
@@ -441,7 +441,7 @@ MethodViews SplatViews(const BenchmarkObject& object, GaussianCloud cloud) {
     ANCHORSPLAT_RETURN_IF_ERROR(state->rasterizer.Render(state->still, camera, state->options, output));
     if (!state->warned) {
       const std::string warning =
-          NothingToSee(state->cloud, camera, state->options, state->rasterizer.statistics().visible);
+          EmptyPictureReason(state->cloud, camera, state->options, state->rasterizer.statistics().visible);
       if (!warning.empty()) LogWarning(Cat(object.name, ": ", warning));
       state->warned = !warning.empty();
     }

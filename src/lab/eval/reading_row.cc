@@ -31,9 +31,9 @@
 #include "reading/places.h"
 #include "reading/reading_model.h"
 #include "reading/showing_gaussians.h"
+#include "render/constant_cloud.h"
 #include "render/rasterizer.h"
 #include "render/shown_range.h"
-#include "render/still_cloud.h"
 
 namespace anchorsplat {
 
@@ -98,8 +98,8 @@ Result<ReadingTask> ReadingTaskFrom(const nlohmann::json& json) {
       } else if (name == "downscale") {
         if (!value.is_number_integer()) return bad("downscale is no whole number");
         task.downscale = value.get<int>();
-        if (task.downscale < 1 || task.downscale > kMostDownscale) {
-          return bad(Cat("downscale is not from 1 to ", kMostDownscale));
+        if (task.downscale < 1 || task.downscale > kMaxDownscale) {
+          return bad(Cat("downscale is not from 1 to ", kMaxDownscale));
         }
       } else if (name == "measure") {
         task.measure = value.get<bool>();
@@ -253,16 +253,16 @@ struct Measuring {
     if (keep) {
       std::vector<int64_t> rows;
       for (int64_t i = 0; i < cloud.size(); ++i) {
-        if (keep->Holds(cloud.means.data() + 3 * i)) rows.push_back(i);
+        if (keep->Contains(cloud.means.data() + 3 * i)) rows.push_back(i);
       }
       if (rows.empty()) return Error{ErrorCode::kBadFile, "no Gaussian lies in the region that is kept"};
       ANCHORSPLAT_ASSIGN_OR_RETURN(cloud, Subset(cloud, rows));
     }
     if (!context.empty()) ANCHORSPLAT_RETURN_IF_ERROR(Append(cloud, context));
-    RenderOptions options = OptionsFor(cloud);
+    RenderOptions options = DisplayOptions(cloud);
     options.background = background;
     double sum = 0;
-    StillCloud still(cloud);
+    ConstantCloud still(cloud);
     const auto add = [&](size_t v, RenderOutput& output) -> Status {
       Clamp01(output.color);
       FillIgnored(*ignored[v], *truths[v], output.color);
@@ -302,7 +302,7 @@ std::vector<RenderMode> ModesOf(const GaussianCloud& cloud) {
 
 CameraSet Moved(CameraSet set, const Similarity& move, const WorldOrigin& origin) {
   for (Camera& camera : set.cameras) {
-    camera.world_to_camera = FromOrigin(Moved(camera.world_to_camera, move), origin);
+    camera.world_to_camera = RelativeToOrigin(Moved(camera.world_to_camera, move), origin);
   }
   return set;
 }
@@ -406,7 +406,7 @@ Result<nlohmann::json> ReadingRows::Make(const ReadingTask& task) {
   if (object == nullptr) return row;
   options.upscale = object->upscale;
   Measuring measuring;
-  if (task.keep) measuring.keep = FromOrigin(*task.keep, cloud.origin);
+  if (task.keep) measuring.keep = RelativeToOrigin(*task.keep, cloud.origin);
   measuring.background = object->background;
   const CameraSet low = Moved(object->low, task.moved, cloud.origin);
   CameraSet held_out;

@@ -4,8 +4,8 @@
 #include <array>
 #include <system_error>
 
+#include "core/ascii_lower_case.h"
 #include "core/file_system.h"
-#include "core/small_letters.h"
 #include "core/text.h"
 #include "io/file_bytes.h"
 
@@ -87,13 +87,13 @@ std::string FolderAssets::Find(const std::string& relative) const {
   if (IsFile(path)) return path.string();
   // Letters of the wrong case, in the file's name only. A bound on what a full folder costs.
   constexpr int kMostEntries = 100'000;
-  const std::string wanted = SmallLetters(path.filename().string());
+  const std::string wanted = AsciiLowerCase(path.filename().string());
   int seen = 0;
   const fs::path parent = path.parent_path();
   for (fs::directory_iterator it(parent.empty() ? "." : parent, error), end; !error && it != end; it.increment(error)) {
     if (++seen > kMostEntries) break;
     std::error_code ignored;
-    if (SmallLetters(it->path().filename().string()) == wanted && it->is_regular_file(ignored)) {
+    if (AsciiLowerCase(it->path().filename().string()) == wanted && it->is_regular_file(ignored)) {
       return it->path().string();
     }
   }
@@ -106,12 +106,12 @@ Result<std::string> FolderAssets::ReadFound(const std::string& found, uint64_t m
 
 ZipAssets::ZipAssets(std::shared_ptr<const ZipReader> archive, std::string folder)
     : archive_(std::move(archive)), folder_(std::move(folder)) {
-  for (const std::string& member : archive_->Members()) members_.emplace(SmallLetters(member), member);
+  for (const std::string& member : archive_->Members()) members_.emplace(AsciiLowerCase(member), member);
 }
 
 std::string ZipAssets::Find(const std::string& relative) const {
   const std::string path = (fs::path(folder_) / relative).lexically_normal().generic_string();
-  const auto found = members_.find(SmallLetters(path));
+  const auto found = members_.find(AsciiLowerCase(path));
   // A name with a slash at the end is a folder.
   return found == members_.end() || found->second.ends_with('/') ? std::string() : found->second;
 }

@@ -7,7 +7,7 @@
 #include <sstream>
 #include <utility>
 
-#include "core/small_letters.h"
+#include "core/ascii_lower_case.h"
 #include "core/text.h"
 #include "io/file_bytes.h"
 #include "scene/java_properties.h"
@@ -102,7 +102,7 @@ void FurnitureCatalog::FindLicences(const JavaProperties& properties) {
   // Licence files by folder.
   std::map<std::string, std::string> files;
   for (const std::string& member : archive_->Members()) {
-    const std::string name = SmallLetters(FileOf(member));
+    const std::string name = AsciiLowerCase(FileOf(member));
     if (name.find("licen") == std::string::npos || FolderOf(member).empty()) continue;
     if (name.ends_with(".txt") || name.ends_with(".html") || name.ends_with(".htm") || name.ends_with(".md")) {
       files.emplace(FolderOf(member), member);

@@ -45,16 +45,16 @@ WideView LookWide(const RayTracer& tracer, Camera camera) {
 
 // What the lens's camera sees: each of 3 × 3 rays per pixel goes where the lens sends it, and meets what the nearest of
 // the many rays meets.
-Image ThroughLens(const WideView& wide, const Pinhole& bent, const Lens& lens) {
+Image ThroughLens(const WideView& wide, const Pinhole& distorted, const Lens& lens) {
   constexpr int kRays = 3;
   const LensInverse inverse(lens);
-  Image out(bent.width, bent.height, 4);
-  for (int y = 0; y < bent.height; ++y) {
-    for (int x = 0; x < bent.width; ++x) {
+  Image out(distorted.width, distorted.height, 4);
+  for (int y = 0; y < distorted.height; ++y) {
+    for (int x = 0; x < distorted.width; ++x) {
       double sum[4] = {0, 0, 0, 0};
       for (int ray = 0; ray < kRays * kRays; ++ray) {
         const double u = x + (ray % kRays + 0.5) / kRays, v = y + (ray / kRays + 0.5) / kRays;
-        const auto p = inverse.Undistort({(u - bent.cx) / bent.fx, (v - bent.cy) / bent.fy});
+        const auto p = inverse.Undistort({(u - distorted.cx) / distorted.fx, (v - distorted.cy) / distorted.fy});
         if (!p) continue;
         const int column = static_cast<int>(std::floor(wide.pinhole.fx * (*p)[0] + wide.pinhole.cx));
         const int row = static_cast<int>(std::floor(wide.pinhole.fy * (*p)[1] + wide.pinhole.cy));
@@ -88,12 +88,12 @@ TEST(LensPicture, UndoneIsWhatThePinholeSees) {
     ASSERT_TRUE(tracer.ok()) << tracer.error().message;
     const WideView wide = LookWide(*tracer, camera);
     for (const auto& [name, lens] : lenses) {
-      const auto straight = StraightPinhole(lens, camera.intrinsics);
-      ASSERT_TRUE(straight.ok());
+      const auto undistorted = UndistortedPinhole(lens, camera.intrinsics);
+      ASSERT_TRUE(undistorted.ok());
       const ViewPicture undone =
-          Undistort({ThroughLens(wide, camera.intrinsics, lens), {}}, lens, camera.intrinsics, *straight);
+          Undistort({ThroughLens(wide, camera.intrinsics, lens), {}}, lens, camera.intrinsics, *undistorted);
       Camera pinhole = camera;
-      pinhole.intrinsics = *straight;
+      pinhole.intrinsics = *undistorted;
       const auto truth = tracer->Render(pinhole, {.samples = 4});
       ASSERT_TRUE(truth.ok());
       const double psnr = PsnrOf(undone.image, *truth, undone.ignored);

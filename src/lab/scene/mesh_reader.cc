@@ -5,7 +5,7 @@
 #include <system_error>
 #include <utility>
 
-#include "core/small_letters.h"
+#include "core/ascii_lower_case.h"
 #include "core/text.h"
 #include "io/file_bytes.h"
 #include "scene/furniture_catalog.h"
@@ -26,7 +26,7 @@ struct Address {
 };
 
 Address Parse(const std::string& address) {
-  const size_t ending = SmallLetters(address).rfind(kLibraryEnding);
+  const size_t ending = AsciiLowerCase(address).rfind(kLibraryEnding);
   if (ending != std::string::npos) {
     const size_t end = ending + kLibraryEnding.size();
     if (end == address.size()) return {address, {}, true};
@@ -44,7 +44,7 @@ void FindLicenceBeside(const fs::path& path, MeshOrigin& origin) {
   int seen = 0;
   for (fs::directory_iterator it(folder, error), end; !error && it != end && ++seen <= kMostEntries;
        it.increment(error)) {
-    const std::string name = SmallLetters(it->path().filename().string());
+    const std::string name = AsciiLowerCase(it->path().filename().string());
     const std::string ending = fs::path(name).extension().string();
     const bool named = name.find("licen") != std::string::npos || name.find("copying") != std::string::npos;
     const bool text = ending.empty() || ending == ".txt" || ending == ".html" || ending == ".md";

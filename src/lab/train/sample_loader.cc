@@ -226,7 +226,7 @@ SampleLoader::SampleLoader(const TrainConfig& config, Order order, ObjectStore& 
       network_(network),
       device_(device),
       thread_([this, run = internal::CurrentRun()] {
-        const internal::TakePart part(run);  // in what the training takes part in
+        const internal::JoinRun part(run);  // in what the training takes part in
         Run();
       }) {}
 

@@ -181,7 +181,7 @@ Status Trainer::Begin() {
     ANCHORSPLAT_ASSIGN_OR_RETURN(progress_, ReadTrainCheckpoint(checkpoint, progress_, *optimizer_));
   } else if (!request_.start.empty()) {
     ANCHORSPLAT_RETURN_IF_ERROR(StartFromCheckpoint(request_.start, *optimizer_));
-    ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(checkpoint));  // not the one that is to be replaced
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckNotInput(checkpoint));  // not the one that is to be replaced
   }
   if (Leads()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(log_, TrainLog::Open(request_.out, progress_.step));

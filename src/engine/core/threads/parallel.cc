@@ -64,7 +64,7 @@ void ParallelRanges(int64_t begin, int64_t end, int64_t grain, RangeFunction fun
       tbb::parallel_for(
           int64_t{0}, chunks,
           [&](int64_t chunk) {
-            const TakePart part(run);
+            const JoinRun part(run);
             LeaveIfAbandoned();
             one(chunk);
           },

@@ -14,9 +14,9 @@
 
 #include "core/run.h"
 
-// Parallel loops for the web. What is linked without threads does its chunks in order; with threads, a pool of them
-// takes chunks of whichever loop is open. The thread that started a loop only works on that one, so that what a body
-// keeps per thread is never in use twice.
+// Parallel loops for the web. A module linked without threads runs chunks in order; with threads, a pool takes chunks
+// of any open loop. The thread that started a loop works only on that one, so that PerThread scratch memory is never in
+// use twice.
 namespace anchorsplat {
 
 namespace {
@@ -34,7 +34,7 @@ struct Loop {
   int64_t begin, end, grain, chunks;
   std::shared_ptr<internal::Run> run;
   std::atomic<int64_t> next{0};
-  // Of the pool's mutex.
+  // Guarded by the pool's mutex.
   int helpers = 0;
   std::exception_ptr failure = nullptr;
 };
@@ -59,11 +59,11 @@ class Pool {
   void Grow(int helpers) {
     try {
       while (static_cast<int>(threads_.size()) < helpers) threads_.emplace_back([this] { Help(); });
-    } catch (const std::system_error&) {  // then those that there are
+    } catch (const std::system_error&) {  // continue with the threads we have
     }
   }
 
-  // A loop that wants help and may have it. The one that was opened last: what waits for it is waited for, too.
+  // The most recently opened loop that accepts helpers: other loops may be waiting for it.
   Loop* Choose() {
     if (helping_ + 1 >= ThreadsOfProcess()) return nullptr;
     for (size_t k = open_.size(); k-- > 0;) {
@@ -83,7 +83,7 @@ class Pool {
       ++helping_;
       lock.unlock();
       {
-        const internal::TakePart part(loop->run);
+        const internal::JoinRun part(loop->run);
         Work(*loop);
       }
       lock.lock();
@@ -98,7 +98,7 @@ class Pool {
       for (int64_t chunk = 0; (chunk = loop.next.fetch_add(1)) < loop.chunks;) {
         LeaveIfAbandoned();
         const int64_t first = loop.begin + chunk * loop.grain;
-        // Not first + grain: a loop may end where int64_t does.
+        // Not first + grain, which could overflow at the end of int64_t.
         loop.function(loop.context, first, loop.end - first > loop.grain ? first + loop.grain : loop.end);
       }
     } catch (...) {

@@ -32,13 +32,13 @@ constexpr size_t kRequiredChunkProperties = 12;
 constexpr std::array<std::string_view, 4> kVertexProperties = {"packed_position", "packed_rotation", "packed_scale",
                                                                "packed_color"};
 
-// min and max of x y z, of the three log-scales and of r g b: the order of kChunkProperties.
+// min and max of x y z, of log-scales and of r g b, in the order of kChunkProperties.
 struct ChunkRanges {
   float mean_min[3], mean_max[3], scale_min[3], scale_max[3], color_min[3], color_max[3];
 };
 static_assert(sizeof(ChunkRanges) == 18 * sizeof(float));
 
-// An element whose rows have one size, and where it lies.
+// An element with rows of fixed size, and its position.
 struct Rows {
   const PlyElement* element = nullptr;
   uint64_t begin = 0;
@@ -78,7 +78,7 @@ Result<Rows> Locate(const InputFile& file, const PlyHeader& header, std::string_
   return Rows{};
 }
 
-// Of the harmonics; 0 where there is no element for them.
+// Degree from the SH element; 0 without one.
 Result<int> HarmonicsDegree(const InputFile& file, const PlyElement* sh) {
   if (sh == nullptr) return 0;
   const auto rest = std::ranges::count_if(
@@ -122,7 +122,7 @@ Result<std::vector<ChunkRanges>> ReadChunks(const InputFile& file, const Rows& r
   return chunks;
 }
 
-// Weighted, not min + t·(max − min): both ends come out exactly.
+// Weighted, not min + t·(max − min): both ends are exact.
 float Mix(float min, float max, uint32_t value, uint32_t steps) {
   const float t = static_cast<float>(value) / static_cast<float>(steps);
   return min * (1 - t) + max * t;
@@ -144,14 +144,14 @@ void UnpackQuat(uint32_t packed, float quat[4]) {
   RestoreLargest(three, quat);
 }
 
-// A file whose header and ranges have been read and checked.
+// A file with its header and ranges read and checked.
 struct OpenedCompressedPly {
   PlyHeader header;
-  Rows vertices, harmonics;  // the element of the latter is null where there are none
+  Rows vertices, harmonics;  // harmonics.element is null without SH
   int degree = 0;
   std::vector<ChunkRanges> chunks;
   std::array<size_t, 4> vertex_offsets{};   // of kVertexProperties
-  std::vector<size_t> harmonics_offsets{};  // of f_rest_0 and on
+  std::vector<size_t> harmonics_offsets{};  // of f_rest_0 onwards
 
   int64_t count() const { return vertices.element->count; }
   size_t vertex_size() const { return static_cast<size_t>(vertices.element->row_size()); }
@@ -180,7 +180,7 @@ Result<OpenedCompressedPly> OpenCompressedPly(const InputFile& file, const ReadL
                                WithThousands(count), " Gaussians"));
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(ply.degree, HarmonicsDegree(file, sh));
-  // Rows of no bytes would let the header promise any number of them.
+  // Empty rows would allow any count.
   for (size_t k = 0; k < kVertexProperties.size(); ++k) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(ply.vertex_offsets[k],
                                  OffsetOf(file, *ply.vertices.element, kVertexProperties[k], PlyType::kUint32));
@@ -193,7 +193,7 @@ Result<OpenedCompressedPly> OpenCompressedPly(const InputFile& file, const ReadL
   return ply;
 }
 
-// Rows of the file from `first` on to row `to` of the cloud and on.
+// Reads rows of the file from `first` on into rows of the cloud from `to` on.
 void UnpackVertices(const OpenedCompressedPly& ply, const uint8_t* bytes, int64_t first, int64_t count, int64_t to,
                     GaussianCloud& cloud) {
   static const std::array<float, 256> kLogits = [] {
@@ -239,7 +239,7 @@ Status ReadHarmonics(const InputFile& file, const OpenedCompressedPly& ply, Gaus
                      });
 }
 
-// The bytes of the harmonics stand for finite numbers, whatever they are: nobody looks at them.
+// SH bytes always decode to finite numbers, so they need not be read.
 class CompressedPlyBlocks final : public FileBlocks {
  public:
   CompressedPlyBlocks(const InputFile& file, OpenedCompressedPly ply) : file_(file), ply_(std::move(ply)) {
@@ -251,14 +251,14 @@ class CompressedPlyBlocks final : public FileBlocks {
   }
 
  private:
-  Status Fill(int64_t first, int64_t last, Room& room, std::span<uint8_t>) override {
-    return ReadRows(file_, ply_.vertices.begin, ply_.vertex_size(), first, last, room.bytes,
+  Status Fill(int64_t first, int64_t last, Scratch& scratch, std::span<uint8_t>) override {
+    return ReadRows(file_, ply_.vertices.begin, ply_.vertex_size(), first, last, scratch.bytes,
                     [&](const uint8_t* bytes, int64_t count, int64_t to) {
-                      UnpackVertices(ply_, bytes, first + to, count, to, room.rows);
+                      UnpackVertices(ply_, bytes, first + to, count, to, scratch.rows);
                     });
   }
-  Status EndFirst() override {
-    WarnOfOddTags(file_, ply_.header);
+  Status EndFirstPass() override {
+    WarnOfUnknownModeTags(file_, ply_.header);
     return {};
   }
 
@@ -288,7 +288,7 @@ Result<GaussianCloud> ReadCompressedPly(const InputFile& file, const ReadLimits&
                                             UnpackVertices(ply, bytes, first, last - first, first, cloud);
                                           }));
   if (ply.degree > 0) ANCHORSPLAT_RETURN_IF_ERROR(ReadHarmonics(file, ply, cloud));
-  WarnOfOddTags(file, ply.header);
+  WarnOfUnknownModeTags(file, ply.header);
   cloud.render_mode = ply.header.render_mode;
   cloud.comments = std::move(ply.header.comments);
   cloud.origin = ply.header.origin;

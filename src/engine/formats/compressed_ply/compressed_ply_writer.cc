@@ -35,8 +35,8 @@ constexpr int64_t kChunk = kCompressedPlyChunk;
 constexpr size_t kChunkBytes = 18 * sizeof(float);
 constexpr size_t kVertexBytes = 4 * sizeof(uint32_t);
 constexpr int64_t kChunksPerTask = 32;
-// Scales beyond are as good as zero or infinite, and one of them would take all bits of its chunk.
-constexpr float kMaxLogScale = 20;
+// Larger or smaller scales are practically infinite or zero, and one of them would use up the range of its chunk.
+constexpr float kMaxPackedLogScale = 20;
 
 int64_t Chunks(int64_t count) { return (count + kChunk - 1) / kChunk; }
 
@@ -62,7 +62,7 @@ std::string Header(const CloudView& cloud, int64_t count, int sh_degree) {
   return header + "end_header\n";
 }
 
-// Three values of each Gaussian of a chunk with the range of the finite ones.
+// Three values per Gaussian of a chunk, with the range of the finite ones.
 struct RangedValues {
   float values[kChunk][3];
   float min[3], max[3];
@@ -81,7 +81,7 @@ struct RangedValues {
       max[k] = low <= high ? high : 0;
     }
   }
-  // In double: the difference of two floats of any size is finite there.
+  // In double, where the difference of any two floats is finite.
   uint32_t Quantize(int64_t i, int k, uint32_t steps) const {
     const double extent = double{max[k]} - double{min[k]};
     if (!(extent > 0)) return 0;
@@ -102,7 +102,7 @@ uint32_t PackQuat(const float quat[4]) {
 void PackHarmonics(const float* sh, size_t rest, uint8_t* out) {
   uint8_t bytes[3 * ShCoefficients(kMaxShDegree)];
   for (size_t k = 0; k < rest; ++k) {
-    // Truncated, not rounded: the reader puts values into the middle of their step.
+    // Truncated, as the reader places values in the middle of their step.
     const float scaled = (sh[k] / 8 + 0.5f) * 256;
     const float bounded = scaled > 0 ? (scaled < 255 ? scaled : 255.0f) : 0.0f;
     bytes[k] = static_cast<uint8_t>(static_cast<int32_t>(bounded));
@@ -112,13 +112,12 @@ void PackHarmonics(const float* sh, size_t rest, uint8_t* out) {
   }
 }
 
-// Asks for the memory of a Gaussian. In Morton order rows lie anywhere, and waiting for one after the other takes
-// longer than all the arithmetic.
+// Prefetches a Gaussian: in Morton order rows are scattered, and waiting for each takes longer than the arithmetic.
 void Prefetch(const CloudView& cloud, int64_t row) {
   const auto fetch = [](const float* values, int64_t count) {
     constexpr int64_t kLine = 64 / sizeof(float);
     for (int64_t k = 0; k < count; k += kLine) __builtin_prefetch(values + k);
-    __builtin_prefetch(values + count - 1);  // of a row that begins within a line
+    __builtin_prefetch(values + count - 1);  // if the row crosses a cache line
   };
   fetch(cloud.means.data() + 3 * row, 3);
   fetch(cloud.log_scales.data() + 3 * row, 3);
@@ -127,7 +126,7 @@ void Prefetch(const CloudView& cloud, int64_t row) {
   fetch(cloud.sh.data() + row * cloud.sh_stride(), cloud.sh_stride());
 }
 
-// The three parts of the file that one chunk fills.
+// Destinations of one chunk in the three parts of the file.
 struct PackedChunk {
   uint8_t* ranges;     // [18] floats
   uint8_t* vertices;   // [count][4] uints
@@ -148,7 +147,7 @@ void PackChunk(const CloudView& cloud, const Buffer<uint32_t>& order, int64_t fi
     for (int k = 0; k < 3; ++k) {
       means.values[i][k] = cloud.means[static_cast<size_t>(3 * row + k)];
       const float log_scale = cloud.log_scales[static_cast<size_t>(3 * row + k)];
-      scales.values[i][k] = std::clamp(log_scale, -kMaxLogScale, kMaxLogScale);  // NaN stays
+      scales.values[i][k] = std::clamp(log_scale, -kMaxPackedLogScale, kMaxPackedLogScale);  // NaN stays
       colors.values[i][k] = ColorFromDc(dc[k]);
     }
   }
@@ -236,7 +235,7 @@ Strays CompressedPlyStrays(const CloudView& cloud) {
   const Buffer<uint32_t> order = MortonOrder(cloud);
   struct Row {
     int64_t row;
-    double away, weight, size;  // world units from the middle; SeenWeight, SizeOf
+    double away, weight, size;  // distance from the middle in world units; VisibleWeight; SizeOf
     bool far;
   };
   std::vector<Row> rows;
@@ -254,13 +253,13 @@ Strays CompressedPlyStrays(const CloudView& cloud) {
     if (!any) continue;
     double all = 0;
     for (Row& row : rows) {
-      row.weight = SeenWeight(cloud, row.row, *framing);
+      row.weight = VisibleWeight(cloud, row.row, *framing);
       row.size = SizeOf(cloud, row.row);
       all += row.weight;
     }
     std::ranges::sort(rows,
                       [](const Row& a, const Row& b) { return std::tie(a.away, b.row) < std::tie(b.away, a.row); });
-    // From the nearest on: what the first ones lose in the box of them alone, and what all others are worth.
+    // From the nearest outwards: the loss of those so far in their own box, and the weight of all others.
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     std::array<double, 3> low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
     double beyond = all, least = kInfinity, whole = 0;
@@ -282,7 +281,7 @@ Strays CompressedPlyStrays(const CloudView& cloud) {
       }
       whole = loss;
     }
-    if (whole <= kLossThatShows * all) continue;
+    if (whole <= kVisibleLoss * all) continue;
     for (size_t k = best; k < rows.size(); ++k) {
       strays.rows.push_back(rows[k].row);
       strays.farthest = std::max(strays.farthest, rows[k].away);
@@ -293,9 +292,9 @@ Strays CompressedPlyStrays(const CloudView& cloud) {
 }
 
 std::string CompressedPlyMeanLoss(const CloudView& cloud) {
-  constexpr double kStray = 8;       // of the box of the middle 98 %: where it ends well, nobody needs to look closer
-  constexpr double kUsualChunk = 4;  // times its share of the volume: surfaces have larger ones than solids
-  constexpr double kLeastChunk = 0.5, kMostChunk = 2;  // of the box: steps of 1/4094 and 1/1023 of it
+  constexpr double kStray = 8;       // times the box of the middle 98 %: if all end there, no closer look is needed
+  constexpr double kUsualChunk = 4;  // times its share of the volume; surfaces have larger chunks than solids
+  constexpr double kLeastChunk = 0.5, kMostChunk = 2;  // relative to the box: steps of 1/4094 and 1/1023 of it
   const MiddleOfMeans middle = FindMiddleOfMeans(cloud);
   const std::optional<Bounds> bounds = ComputeBounds(cloud);
   double widest = 0;
@@ -318,7 +317,7 @@ std::string CompressedPlyMeanLoss(const CloudView& cloud) {
         low = std::min(low, x);
         high = std::max(high, x);
       }
-      side = std::max(side, high - low);  // −∞ where none is finite
+      side = std::max(side, high - low);  // −∞ if none is finite
     }
     if (side <= usual) continue;
     coarse += last - first;

@@ -1,5 +1,5 @@
-// fuzz_readers: damaged files against every reader. A child process reads them one after the other; the parent sees it
-// crash or hang, saves the input that did it, and says how to run it again.
+// fuzz_readers: feeds damaged files to every reader. A child process reads them one by one; the parent detects a crash
+// or hang, saves the input, and prints how to reproduce it.
 
 #include <fcntl.h>
 #include <sys/mman.h>
@@ -25,11 +25,11 @@
 
 #if defined(__has_feature)
 #if __has_feature(address_sanitizer)
-#define __SANITIZE_ADDRESS__ 1  // clang asks in another way
+#define __SANITIZE_ADDRESS__ 1  // clang spells it differently
 #endif
 #endif
 #if defined(__SANITIZE_ADDRESS__)
-// Inputs have a megabyte at most: a reader that asks for this much at once has believed a header.
+// Inputs have at most a megabyte: a reader that allocates this much at once trusted a header.
 extern "C" const char* __asan_default_options() {  // NOLINT: the sanitizer's name
   return "max_allocation_size_mb=256:hard_rss_limit_mb=3072:detect_stack_use_after_return=0";
 }
@@ -57,9 +57,9 @@ struct Counts {
   std::atomic<uint64_t> slowest_us;
 };
 
-// What both processes see. The input is there before it is read, so that it survives its reader.
+// Shared memory of both processes. Inputs are stored there before they are read, so that they survive a crash.
 struct Shared {
-  std::atomic<uint64_t> input;  // number of the current one, from 1
+  std::atomic<uint64_t> input;  // number of the current input
   std::atomic<bool> finished;
   size_t reader;
   size_t size;
@@ -67,7 +67,7 @@ struct Shared {
   Counts counts[64];
 };
 
-constexpr auto kHang = std::chrono::seconds(20);  // an input takes milliseconds, also on a busy machine
+constexpr auto kHang = std::chrono::seconds(20);  // an input takes milliseconds, even on a busy machine
 
 void ReadOne(const FuzzReader& reader, size_t index, uint64_t number, const std::string& bytes, Shared& shared) {
   shared.reader = index;
@@ -99,7 +99,7 @@ int Work(const Options& options, const fs::path& folder, Shared& shared) {
     shared.finished = true;
     return 0;
   }
-  // A seed that is not accepted tests nothing.
+  // A rejected seed tests nothing.
   for (size_t r = 0; r < readers.size(); ++r) {
     for (const std::string& seed : readers[r].seeds) {
       if (const Status status = readers[r].read(seed); !status.ok()) {
@@ -113,7 +113,7 @@ int Work(const Options& options, const fs::path& folder, Shared& shared) {
   const auto end = Clock::now() + std::chrono::duration<double>(options.seconds);
   for (uint64_t k = options.first; options.seconds > 0 ? Clock::now() < end : k < options.first + options.inputs; ++k) {
     const size_t r = static_cast<size_t>(k % readers.size());
-    // Every input has a generator of its own, so that one can be made again without those before it.
+    // Each input has its own generator, so that it can be reproduced alone.
     Random random(options.seed * 0x9E3779B97F4A7C15u + k);
     ReadOne(readers[r], r, k, Mutate(readers[r].seeds, readers[r].words, random), shared);
   }
@@ -155,7 +155,7 @@ int Supervise(const Options& options, pid_t child, const Shared& shared) {
     if (ended == child) {
       if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return 0;
       if (WIFEXITED(status) && WEXITSTATUS(status) == 2) return 2;
-      if (shared.finished) {  // the sanitizer's last word, about all inputs together
+      if (shared.finished) {  // the sanitizer's final report on all inputs
         std::fprintf(stderr, "the reader process ended badly after its last input (a leak?)\n");
         return 1;
       }
@@ -174,7 +174,7 @@ int Supervise(const Options& options, pid_t child, const Shared& shared) {
   }
 }
 
-// In memory where there is such a folder: most readers read by path.
+// In memory if possible, as most readers read by path.
 fs::path MakeFolder() {
   const fs::path memory = "/dev/shm";
   const bool usable = ::access(memory.c_str(), W_OK) == 0;

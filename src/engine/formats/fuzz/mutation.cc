@@ -40,7 +40,7 @@ constexpr std::array<uint64_t, 14> kIntegers = {0,          1,          0x7f,   
                                                 0x7fff,     0x8000,     0xffff,     0x7fffffff, 0x80000000,
                                                 0xffffffff, 0x7fc00000, 0x7f800000, UINT64_MAX};
 
-// An index of `text`; headers deserve more attention than the numbers behind them.
+// A random index of `text`, biased towards headers.
 size_t Place(const std::string& text, Random& random) {
   if (text.empty()) return 0;
   const auto size = static_cast<int64_t>(text.size());
@@ -66,7 +66,7 @@ void SetBytes(std::string& text, Random& random) {
   }
 }
 
-// A telling number of 1, 2, 4 or 8 bytes in either byte order, where lengths and counts may be.
+// Replaces 1, 2, 4 or 8 bytes by an edge-case integer in either byte order, as lengths and counts may be anywhere.
 void SetInteger(std::string& text, Random& random) {
   const size_t size = size_t{1} << random.Below(4);
   if (text.size() < size) return;
@@ -114,7 +114,7 @@ void ChangeNumber(std::string& text, Random& random) {
   text.replace(begin, end - begin, kNumbers[static_cast<size_t>(random.Below(kNumbers.size()))]);
 }
 
-// [begin, end) of the line around a place, its end included.
+// [begin, end) of the line around a position, including its line end.
 std::pair<size_t, size_t> LineAt(const std::string& text, size_t at) {
   const size_t before = at == 0 ? std::string::npos : text.rfind('\n', at - 1);
   const size_t begin = before == std::string::npos ? 0 : before + 1;

@@ -28,7 +28,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// An accepted input that should not have been is a bug like a crash, and is reported like one.
+// Accepting bad input is a bug like a crash, and is reported as one.
 void Require(bool condition, const char* what) {
   if (condition) return;
   std::fprintf(stderr, "a reader accepted a file and gave %s\n", what);
@@ -40,7 +40,7 @@ Status CheckError(const Error& error, std::string_view file) {
   return error;
 }
 
-// Who looks at the file block by block must see what reading it gave.
+// Blocks must match the whole file.
 void CompareBlocks(const SplatFormat& format, const InputFile& input, const Result<GaussianCloud>& read) {
   if (format.blocks == nullptr) return;
   const std::string difference = DifferenceOfBlocks(format.blocks, input, {}, read);
@@ -80,7 +80,7 @@ Status ReadAsCloud(const std::string& file, const std::string& bytes) {
   return {};
 }
 
-// The file of a reader by path. Removed before it is written: some file systems flush a file that is emptied.
+// Writes the file for a reader by path. Removed first: some file systems flush a file that is truncated and rewritten.
 void Put(const fs::path& path, const std::string& bytes) {
   fs::remove(path);
   std::ofstream(path, std::ios::binary) << bytes;
@@ -88,7 +88,7 @@ void Put(const fs::path& path, const std::string& bytes) {
 
 Status ReadAsCameras(const fs::path& file, const fs::path& target, const std::string& bytes) {
   Put(file, bytes);
-  const Messages unsaid;  // what is left out of thousands of files
+  const Messages unsaid;  // silences warnings about thousands of files
   const auto set = ReadCameras(target);
   if (!set.ok()) return CheckError(set.error(), target.filename().string());
   for (const Camera& camera : set->cameras) {
@@ -108,11 +108,10 @@ Status ReadAsImage(const fs::path& file, const std::string& bytes) {
   return {};
 }
 
-// Splat formats: a reader for each row of the registry that has one, its seeds made by its own writer where there is
-// one, besides those made by hand.
+// Splat formats: a reader for each format in the registry, with seeds from its own writer, if any, and handmade ones.
 void AddSplatFormats(const fs::path& folder, std::vector<FuzzReader>& readers) {
   for (const SplatFormat& format : Formats()) {
-    // The latter two are of several files.
+    // The latter two have several files.
     if (format.read == nullptr || format.name == "glTF as JSON" || format.name == "streamed SOG") continue;
     const std::string file = "fuzz" + std::string(format.extensions.front());
     FuzzReader reader{
@@ -137,8 +136,8 @@ void AddSplatFormats(const fs::path& folder, std::vector<FuzzReader>& readers) {
   }
 }
 
-// Up to version 3, SPZ is one gzip stream, whose checksum refuses nearly every damage: here the content is damaged and
-// packed again.
+// Up to version 3, SPZ is one gzip stream, whose checksum rejects nearly all damage: damage its contents and compress
+// again.
 void AddSpzContent(const fs::path& folder, std::vector<FuzzReader>& readers) {
   FuzzReader reader{
       "SPZ in gzip", {}, {}, [](const std::string& bytes) { return ReadAsCloud("fuzz.spz", Gzip(bytes)); }};
@@ -146,7 +145,7 @@ void AddSpzContent(const fs::path& folder, std::vector<FuzzReader>& readers) {
   readers.push_back(std::move(reader));
 }
 
-// What is around a splat.
+// Compressed and archived splats.
 void AddPackedSplats(const fs::path& folder, std::vector<FuzzReader>& readers) {
   readers.push_back({"packed splat", PackedSeeds(folder), {}, [](const std::string& bytes) -> Status {
                        const auto opened = OpenedSplat::Of(InputFile::FromBytes("fuzz.ply.gz", bytes));
@@ -159,8 +158,8 @@ void AddPackedSplats(const fs::path& folder, std::vector<FuzzReader>& readers) {
                      }});
 }
 
-// Splats of several files, of which one is damaged: SOG folders, as the members of a ZIP archive have checksums, and
-// the JSON of a glTF with its numbers beside it.
+// Splats of several files, one of which is damaged: SOG folders (members of a ZIP archive have checksums), and the JSON
+// of a glTF with a separate buffer.
 void AddSplatsOfSeveralFiles(const fs::path& folder, std::vector<FuzzReader>& readers) {
   struct Part {
     const char *format, *main, *damaged;
@@ -197,7 +196,7 @@ Status ReadAsTensors(const std::string& file, const std::string& bytes) {
   const auto tensors = TensorFile::FromBytes(std::move(copy), file);
   if (!tensors.ok()) return CheckError(tensors.error(), file);
   for (const TensorEntry& entry : tensors->tensors()) {
-    // Strides may name one element many times over; who asks for a copy knows the shape it expects.
+    // Strides may repeat one element many times; callers that copy know the expected shape.
     if (entry.bytes() > (int64_t{16} << 20)) continue;
     const auto values = CopyContiguous(entry);
     Require(!values.ok() || static_cast<int64_t>(values->size()) == entry.bytes(), "a tensor of another size");
@@ -224,7 +223,7 @@ void AddCameraFormats(const fs::path& folder, std::vector<FuzzReader>& readers) 
   add("poses_bounds.npy", {PosesBoundsSeed()}, {"'<f4'", "True", "(2, 17)"});
   add("metashape.xml", MetashapeSeeds(), XmlWords());
   add("reconstruction.json", OpenSfmSeeds(), JsonWords());
-  // The sizes of Bundler's cameras are those of pictures, and nerfstudio's frame is of cameras beside it.
+  // Bundler's image sizes come from images, and nerfstudio's frame belongs to cameras beside it.
   fs::create_directories(folder / "bundler");
   fs::create_directories(folder / "nerfstudio");
   (void)WritePng(folder / "bundler" / "a.png", Image(40, 30, 3));
@@ -232,7 +231,7 @@ void AddCameraFormats(const fs::path& folder, std::vector<FuzzReader>& readers) 
   Put(folder / "nerfstudio" / "transforms.json", TransformsSeeds().front());
   add("bundler/bundle.out", {BundlerSeed()}, {"nan", "1e308", "-", "0"});
   add("nerfstudio/dataparser_transforms.json", {NerfstudioFrameSeed()}, JsonWords());
-  // A COLMAP model is two files: one is damaged, the other stays good.
+  // A COLMAP model has two files: one is damaged, the other stays intact.
   const auto add_colmap = [&](const char* kind, const char* damaged, const ColmapSeeds& good, bool cameras) {
     const fs::path model = folder / Cat("colmap_", kind, "_", cameras ? "cameras" : "images");
     fs::create_directories(model);

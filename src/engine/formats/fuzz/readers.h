@@ -10,15 +10,15 @@
 
 namespace anchorsplat {
 
-// One reader under test. `read` gives its status; what it accepts must be sound (it aborts otherwise).
+// A reader under test. `read` returns its status, and aborts if accepted data is unsound.
 struct FuzzReader {
   std::string name;
   std::vector<std::string> seeds;       // good files
-  std::vector<std::string_view> words;  // of the format's text, to be put in wrong places
+  std::vector<std::string_view> words;  // words of the format's text, for mutations
   std::function<Status(const std::string& bytes)> read;
 };
 
-// All readers of the room. Those that read by path find their input in `folder`, which must be there.
+// All readers. Those that read by path use files in `folder`, which must exist.
 std::vector<FuzzReader> FuzzReaders(const std::filesystem::path& folder);
 
 }  // namespace anchorsplat

@@ -52,7 +52,7 @@ constexpr std::string_view kGaussianNames[] = {"rot_0",   "rot_1",   "rot_2",   
                                                "y",       "z",       "f_dc_0",  "f_dc_1", "f_dc_2",
                                                "opacity", "scale_0", "scale_1", "scale_2"};
 
-// Two rows of doubles and floats in turn behind a list, between elements with and without lists.
+// Two rows of alternating doubles and floats after a list, between elements with and without lists.
 std::string PlyHeaderText(std::string_view encoding) {
   std::string header =
       Cat("ply\nformat ", encoding, " 1.0\ncomment SplatRenderMode: mip\nobj_info seed\n",
@@ -233,7 +233,7 @@ std::vector<std::string> KsplatSeeds() {
 std::string SpzContentSeed(const std::filesystem::path& folder, int sh_degree) {
   (void)WriteSpz(folder / "seed.spz", SeedCloud(5, sh_degree), {.overwrite = true, .spz_version = 3});
   const std::string packed = FileBytes(folder / "seed.spz");
-  std::string content(4096, '\0');  // 5 Gaussians have less
+  std::string content(4096, '\0');  // 5 Gaussians need less
   z_stream stream{};
   stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(packed.data()));
   stream.avail_in = static_cast<uInt>(packed.size());
@@ -524,7 +524,7 @@ std::vector<std::string> TiffSeeds() {
       file.Put(value);
     }
     file.Put(uint32_t{0});
-    for (const uint32_t number : {8u, 8 + strip, strip, strip}) {  // where the two strips are and how long
+    for (const uint32_t number : {8u, 8 + strip, strip, strip}) {  // offsets and sizes of the two strips
       if (!tiled) file.Put(number);
     }
     seeds.push_back(file.bytes());

@@ -39,24 +39,25 @@ class GltfBlocks final : public FileBlocks {
   }
 
  private:
-  Status Fill(int64_t first, int64_t last, Room& room, std::span<uint8_t> finite) override {
+  Status Fill(int64_t first, int64_t last, Scratch& scratch, std::span<uint8_t> finite) override {
     for (int64_t i = first; i < last;) {
       const auto p = static_cast<size_t>(std::upper_bound(begins_.begin(), begins_.end(), i) - begins_.begin()) - 1;
       const int64_t end = std::min(last, begins_[p] + primitives_[p].count());
-      ANCHORSPLAT_RETURN_IF_ERROR(FillFrom(p, i - begins_[p], end - begins_[p], i - first, room, finite));
+      ANCHORSPLAT_RETURN_IF_ERROR(FillFrom(p, i - begins_[p], end - begins_[p], i - first, scratch, finite));
       i = end;
     }
-    TurnAxes(room.rows, TurnBetween(kLuf, kRdf));
+    TurnAxes(scratch.rows, TurnBetween(kLuf, kRdf));
     return {};
   }
 
-  // Rows [first, last) of primitive p to row `to` of the room and on.
-  Status FillFrom(size_t p, int64_t first, int64_t last, int64_t to, Room& room, std::span<uint8_t> finite) const {
+  // Reads rows [first, last) of primitive p into scratch rows from `to` on.
+  Status FillFrom(size_t p, int64_t first, int64_t last, int64_t to, Scratch& scratch,
+                  std::span<uint8_t> finite) const {
     const GltfPrimitive& primitive = primitives_[p];
-    GaussianCloud& rows = room.rows;
+    GaussianCloud& rows = scratch.rows;
     const auto read = [&](const Accessor& accessor, float* out, int64_t width) -> Status {
-      ANCHORSPLAT_RETURN_IF_ERROR(ReadGltfBytes(accessor, first, last, room.bytes));
-      UnpackGltfValues(accessor, room.bytes.data(), last - first, out, width);
+      ANCHORSPLAT_RETURN_IF_ERROR(ReadGltfBytes(accessor, first, last, scratch.bytes));
+      UnpackGltfValues(accessor, scratch.bytes.data(), last - first, out, width);
       return {};
     };
     const GltfColumns columns = {rows.means.data() + 3 * to, rows.quats.data() + 4 * to,
@@ -70,16 +71,16 @@ class GltfBlocks final : public FileBlocks {
     if (primitive.linear) SrgbFromLinear(rows, to, last - first);
     for (size_t k = 1; !finite.empty() && k < primitive.sh.size(); ++k) {
       const Accessor& accessor = primitive.sh[k];
-      ANCHORSPLAT_RETURN_IF_ERROR(ReadGltfBytes(accessor, first, last, room.bytes));
-      const uint8_t* bytes = room.bytes.data();
+      ANCHORSPLAT_RETURN_IF_ERROR(ReadGltfBytes(accessor, first, last, scratch.bytes));
+      const uint8_t* bytes = scratch.bytes.data();
       for (int64_t i = to; i < to + (last - first); ++i, bytes += accessor.stride) {
-        if (HasNotFinite(bytes, 3)) finite[static_cast<size_t>(i)] = 0;
+        if (HasNonFinite(bytes, 3)) finite[static_cast<size_t>(i)] = 0;
       }
     }
     return {};
   }
 
-  GltfDocument document_;  // has the buffers that accessors speak of
+  GltfDocument document_;  // owns the buffers of the accessors
   std::vector<GltfPrimitive> primitives_;
   std::vector<int64_t> begins_;  // the first row of each
 };
@@ -90,7 +91,7 @@ Result<std::unique_ptr<CloudBlocks>> BlocksOfGltf(const InputFile& file, const R
   ANCHORSPLAT_ASSIGN_OR_RETURN(GltfDocument document, GltfDocument::Open(file));
   ANCHORSPLAT_ASSIGN_OR_RETURN(GltfSplats splats, FindGltfSplats(file, document, limits));
   const bool mixes = std::ranges::any_of(splats.primitives, &GltfPrimitive::mixes_harmonics);
-  if (mixes) return std::unique_ptr<CloudBlocks>();  // to be read whole
+  if (mixes) return std::unique_ptr<CloudBlocks>();  // must be read whole
   for (const std::string& warning : splats.warnings) LogWarning(warning);
   ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<std::string> comments, CommentsOfAsset(document.root()));
   return std::unique_ptr<CloudBlocks>(

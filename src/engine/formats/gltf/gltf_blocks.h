@@ -9,8 +9,8 @@
 
 namespace anchorsplat {
 
-// What ReadGltf would give, to look at block by block. `file` must outlive it. Errors as ReadGltf; those of reading
-// come from ForEach.
+// The splat of ReadGltf, block by block. `file` must outlive it. Errors: those of ReadGltf; read errors come from
+// ForEach.
 Result<std::unique_ptr<CloudBlocks>> BlocksOfGltf(const InputFile& file, const ReadLimits& limits);
 
 }  // namespace anchorsplat

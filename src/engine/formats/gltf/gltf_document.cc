@@ -41,8 +41,7 @@ std::optional<std::string> FromBase64(std::string_view text) {
   return bytes;
 }
 
-// The file that a relative URI means, "%20" and the like decoded. Nothing where it leads to another folder or has a
-// scheme: what lies elsewhere is none of the document's business.
+// The file of a relative URI, with percent-decoding. None if it leads to another folder or has a scheme, for safety.
 std::optional<std::string> FileBeside(std::string_view uri) {
   if (uri.find(':') != uri.npos) return std::nullopt;
   std::string name;
@@ -61,7 +60,7 @@ std::optional<std::string> FileBeside(std::string_view uri) {
   return name;
 }
 
-// Whole numbers of glTF may be larger than an int: offsets and lengths.
+// glTF integers may exceed an int: offsets and lengths.
 Result<uint64_t> Offset(const JsonValue& object, const char* key, std::optional<uint64_t> otherwise) {
   const std::optional<JsonValue> value = object.Find(key);
   if (!value) {
@@ -96,11 +95,11 @@ struct Motion {
   Vector translation = {0, 0, 0};
 };
 
-// `outer` after what `node` does itself.
+// The transform of `node`, followed by `outer`.
 Result<Motion> MotionOf(const JsonValue& node, const Motion& outer) {
   Motion own;
   if (const std::optional<JsonValue> matrix = node.Find("matrix")) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> m, matrix->Numbers(16));  // column by column
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> m, matrix->Numbers(16));  // column-major
     if (m[3] != 0 || m[7] != 0 || m[11] != 0 || m[15] != 1) {
       return matrix->Complain("has a last row other than 0 0 0 1, which no node may have");
     }
@@ -128,7 +127,7 @@ Result<Motion> MotionOf(const JsonValue& node, const Motion& outer) {
   return own;
 }
 
-// KHR_node_visibility: hides a node and all below it.
+// KHR_node_visibility: hides a node and its descendants.
 bool IsHidden(const JsonValue& node) {
   const std::optional<JsonValue> extensions = node.Find("extensions");
   const std::optional<JsonValue> visibility = extensions ? extensions->Find("KHR_node_visibility") : std::nullopt;
@@ -263,7 +262,7 @@ Result<GltfDocument::Accessor> GltfDocument::FindAccessor(const JsonValue& index
   ANCHORSPLAT_ASSIGN_OR_RETURN(const uint64_t begin, Offset(value, "byteOffset", 0));
   const uint64_t record = static_cast<uint64_t>(accessor.components * ComponentSize(accessor.component_type));
   ANCHORSPLAT_ASSIGN_OR_RETURN(accessor.stride, Offset(view, "byteStride", record));
-  // All below 2^53 and the stride below 2^8: nothing overflows.
+  // All values are below 2^53 and the stride below 2^8: no overflow.
   if (accessor.stride < record || accessor.stride > 252) return view.Complain("has an impossible byteStride");
   const uint64_t end = begin + accessor.stride * static_cast<uint64_t>(accessor.count - 1) + record;
   if (end > view_size || view_begin > buffer.size || view_size > buffer.size - view_begin) {
@@ -275,7 +274,7 @@ Result<GltfDocument::Accessor> GltfDocument::FindAccessor(const JsonValue& index
   return accessor;
 }
 
-// By node: whether it is a root that the scene shows.
+// Per node: whether it is a root of the shown scene.
 Result<std::vector<char>> GltfDocument::RootsOfScene(size_t nodes, const std::vector<char>& is_child) const {
   const std::optional<JsonValue> scenes = root().Find("scenes");
   if (!scenes || !scenes->raw().is_array() || scenes->raw().empty()) return std::vector<char>(nodes, 1);
@@ -296,7 +295,7 @@ Result<std::vector<char>> GltfDocument::RootsOfScene(size_t nodes, const std::ve
   return roots;
 }
 
-// By node: whether an animation moves it. What is no animation moves nothing.
+// Per node: whether an animation moves it. Invalid animations are ignored.
 std::vector<char> GltfDocument::AnimatedNodes(size_t nodes) const {
   std::vector<char> moved(nodes, 0);
   const nlohmann::json none = nlohmann::json::array();
@@ -319,7 +318,7 @@ Result<std::vector<GltfDocument::Placed>> GltfDocument::PlacedMeshes() const {
   const std::optional<JsonValue> list = root().Find("nodes");
   if (!list) return out;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> nodes, list->Elements());
-  // Every node has one parent at most, so following parents' children reaches each once; twice means a circle.
+  // Each node has at most one parent, so traversal reaches it once; a second time means a cycle.
   std::vector<char> is_child(nodes.size(), 0);
   const auto children_of = [&](const JsonValue& node) -> Result<std::vector<size_t>> {
     std::vector<size_t> children;

@@ -17,7 +17,7 @@
 #include "io/file_bytes_for_test.h"
 #include "io/folder_for_test.h"
 
-// For the tests of glTF: a small file whose JSON and numbers can be changed.
+// For glTF tests: a small file with editable JSON and numbers.
 
 namespace anchorsplat {
 
@@ -47,7 +47,7 @@ struct Glb {
   }
 };
 
-// In all scenes, whatever their nodes become.
+// Shown whatever its nodes become, as it has no scenes.
 inline Glb Example(int64_t n, int degree) {
   const TestFolder folder;
   EXPECT_TRUE(WriteGlb(folder / "a.glb", RandomCloud(n, degree, 3)).ok());
@@ -57,7 +57,7 @@ inline Glb Example(int64_t n, int degree) {
   return glb;
 }
 
-// Sets all values of an attribute of floats.
+// Sets all values of a float attribute.
 inline void SetAttribute(Glb& glb, const char* name, const std::vector<float>& values) {
   const int accessor = glb.json["meshes"][0]["primitives"][0]["attributes"][name];
   const auto at = glb.json["bufferViews"][accessor]["byteOffset"].get<size_t>();

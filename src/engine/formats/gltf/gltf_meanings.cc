@@ -15,13 +15,13 @@ namespace {
 
 using Accessor = GltfDocument::Accessor;
 
-constexpr double kLeastShare = 0.01;      // of values that a specification forbids, to be meant
-constexpr float kLeastNegative = 1e-6f;   // what a program may take for zero
-constexpr float kLeastOutside = 1e-3f;    // what rounding may do
-constexpr float kMostPositiveLogit = 30;  // 100 and 255 are other ways to say opaque
+constexpr double kLeastShare = 0.01;      // fraction of forbidden values that shows intent
+constexpr float kLeastNegative = 1e-6f;   // may count as zero in some programs
+constexpr float kLeastOutside = 1e-3f;    // rounding error
+constexpr float kMostPositiveLogit = 30;  // 100 and 255 mean opaque on other scales
 
 struct Spread {
-  int64_t known = 0, forbidden = 0;  // values that are numbers
+  int64_t known = 0, forbidden = 0;  // values except NaN
   float min = 0, max = 0;            // of the finite ones
 };
 

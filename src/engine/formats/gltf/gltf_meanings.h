@@ -5,11 +5,11 @@
 
 namespace anchorsplat {
 
-// What programs of the drafts of KHR_gaussian_splatting wrote, and some still do, in the place of lengths and of
-// opacities from 0 to 1, is known by its values: a hundredth of the lengths or more are negative; a hundredth of the
-// opacities or more lie outside, on both sides or up to 30. All values are looked at.
+// Detects values of the drafts of KHR_gaussian_splatting, which some programs still write: logarithms instead of
+// lengths, logits instead of opacities in 0–1. The evidence: at least 1 % of scales are negative; at least 1 % of
+// opacities lie outside 0–1, on both sides or up to 30. All values are checked.
 //
-// kBadFile: fewer of them do, or they lie farther out, so that neither meaning fits.
+// kBadFile: fewer values do so, or they lie farther outside, so that neither meaning fits.
 Result<bool> HoldsLogarithms(const JsonValue& attribute, const GltfDocument::Accessor& scales);
 Result<bool> HoldsLogits(const JsonValue& attribute, const GltfDocument::Accessor& opacities);
 

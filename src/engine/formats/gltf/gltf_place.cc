@@ -13,7 +13,7 @@ double DeterminantOf(const Matrix& m) {
   return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
 }
 
-// The transposed inverse: cofactors by the determinant.
+// Transposed inverse: cofactors divided by the determinant.
 Matrix InverseTransposed(const Matrix& m) {
   const double d = DeterminantOf(m);
   return {(m[4] * m[8] - m[5] * m[7]) / d, (m[5] * m[6] - m[3] * m[8]) / d, (m[3] * m[7] - m[4] * m[6]) / d,
@@ -21,7 +21,7 @@ Matrix InverseTransposed(const Matrix& m) {
           (m[1] * m[5] - m[2] * m[4]) / d, (m[2] * m[3] - m[0] * m[5]) / d, (m[0] * m[4] - m[1] * m[3]) / d};
 }
 
-// How far the columns are from being of length 1 and at right angles.
+// Deviation of the columns from orthonormal.
 double FarFromOrthogonal(const Matrix& m) {
   double far = 0;
   for (size_t a = 0; a < 3; ++a) {
@@ -44,7 +44,7 @@ std::optional<GltfPlace> PlaceOf(const std::array<double, 9>& matrix, const std:
   GltfPlace place{std::cbrt(std::abs(determinant)), matrix, translation};
   for (double& x : place.turn) x /= place.scale;
   if (!(FarFromOrthogonal(place.turn) <= kTolerance)) return std::nullopt;
-  // The nearest orthogonal matrix (Higham 1986): each step squares the error.
+  // The nearest orthogonal matrix (Higham 1986); each step squares the error.
   for (int step = 0; step < 4; ++step) {
     const Matrix other = InverseTransposed(place.turn);
     for (size_t k = 0; k < 9; ++k) place.turn[k] = 0.5 * (place.turn[k] + other[k]);

@@ -5,8 +5,8 @@
 
 namespace anchorsplat {
 
-// Where nodes put what they show: x' = scale·turn·x + translation. `turn` is orthogonal, row-major, and mirrors where
-// its determinant is −1.
+// Placement by a node: x' = scale·turn·x + translation. `turn` is orthogonal, row-major, and mirrors if its determinant
+// is −1.
 struct GltfPlace {
   double scale = 1;
   std::array<double, 9> turn = {1, 0, 0, 0, 1, 0, 0, 0, 1};
@@ -16,9 +16,8 @@ struct GltfPlace {
   bool mirrors() const;
 };
 
-// Of x' = matrix·x + translation; nothing where the matrix stretches more one way than another, by more than a
-// ten-thousandth, or makes all flat. Rounding of the numbers in a file is undone: columns become orthogonal, and a turn
-// that is almost one by right angles is one.
+// Decomposes x' = matrix·x + translation; none if the scale is anisotropic by more than 1e-4, or zero. Removes rounding
+// of the file's numbers: columns are orthogonalised, and an almost exact right-angle turn becomes exact.
 std::optional<GltfPlace> PlaceOf(const std::array<double, 9>& matrix, const std::array<double, 3>& translation);
 
 }  // namespace anchorsplat

@@ -22,7 +22,8 @@ namespace {
 using Accessor = GltfDocument::Accessor;
 constexpr const char* kScale = "KHR_gaussian_splatting:SCALE";
 constexpr const char* kOpacity = "KHR_gaussian_splatting:OPACITY";
-constexpr size_t kMaxPrimitives = 1024;  // a node costs a hostile file some bytes, and us a thousand times as many
+// limits amplification: a node is a few bytes in the file and a thousand times that in memory
+constexpr size_t kMaxPrimitives = 1024;
 
 Result<Accessor> Attribute(const GltfDocument& document, const JsonValue& attributes, const std::string& name,
                            int components, bool may_be_integer) {
@@ -38,13 +39,13 @@ Result<Accessor> Attribute(const GltfDocument& document, const JsonValue& attrib
   return accessor;
 }
 
-// The value of an optional word of the extension; `otherwise` where there is none.
+// Value of an optional text member of the extension, or `otherwise`.
 Result<std::string> WordOf(const JsonValue& extension, const char* key, const char* otherwise) {
   const std::optional<JsonValue> value = extension.Find(key);
   return value ? value->Text() : Result<std::string>(otherwise);
 }
 
-// Drafts had other names of the same two.
+// Drafts named these two differently.
 Result<bool> IsLinear(const JsonValue& extension) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string name, WordOf(extension, "colorSpace", "srgb_rec709_display"));
   if (name == "srgb_rec709_display" || name == "BT.709-sRGB" || name == "BT.709-srgb") return false;
@@ -128,7 +129,7 @@ Result<const MeshSplats::Mesh*> MeshSplats::Find(const JsonValue& index) {
 
 namespace {
 
-// Those that may be required and change nothing of splats, by the beginnings of their names.
+// Prefixes of extensions that may be required but do not affect splats.
 constexpr std::array<std::string_view, 12> kHarmless = {"KHR_gaussian_splatting",
                                                         "KHR_mesh_quantization",
                                                         "KHR_node_visibility",
@@ -142,7 +143,7 @@ constexpr std::array<std::string_view, 12> kHarmless = {"KHR_gaussian_splatting"
                                                         "KHR_draco_mesh_compression",
                                                         "MSFT_texture_"};
 
-// What is required and not known may change anything.
+// Unknown required extensions may change anything.
 Status CheckRequired(const GltfDocument& document) {
   const std::optional<JsonValue> required = document.root().Find("extensionsRequired");
   if (!required) return {};
@@ -157,7 +158,7 @@ Status CheckRequired(const GltfDocument& document) {
   return {};
 }
 
-// What a node does with a splat beside placing it.
+// Effects of a node on a splat besides placement.
 Status CheckNode(const GltfDocument::Placed& placed) {
   const std::optional<JsonValue> extensions = placed.node.Find("extensions");
   if (!extensions || !extensions->raw().is_object()) return {};
@@ -169,7 +170,7 @@ Status CheckNode(const GltfDocument::Placed& placed) {
   return {};
 }
 
-// An extension whose name speaks of splats, of a file in which nothing else does.
+// An extension with a splat-like name in a file without known splats.
 std::string OtherSplatExtension(const GltfDocument& document) {
   for (const char* key : {"extensionsRequired", "extensionsUsed"}) {
     const std::optional<JsonValue> list = document.root().Find(key);
@@ -183,7 +184,7 @@ std::string OtherSplatExtension(const GltfDocument& document) {
   return {};
 }
 
-// What its values mean, and what is to be said of that.
+// Determines the meaning of the values, and warns about it.
 Status FindMeanings(const JsonValue& attributes, const std::string& where, GltfPrimitive& primitive,
                     std::vector<std::string>& warnings) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(primitive.logarithms, HoldsLogarithms(*attributes.Find(kScale), primitive.scales));
@@ -199,16 +200,16 @@ Status FindMeanings(const JsonValue& attributes, const std::string& where, GltfP
   return {};
 }
 
-// Far places, as a georeferenced scene gives them, are differences to that of the primitive with most Gaussians. glTF
-// is in metres.
+// Distant placements, as in georeferenced scenes, are made relative to that of the primitive with most Gaussians. glTF
+// uses metres.
 void MoveToOrigin(const InputFile& file, GltfSplats& splats) {
-  constexpr double kDetail = 0.25;  // for which floats are fine enough up to eight kilometres
+  constexpr double kDetail = 0.25;  // metres; floats suffice for it up to eight kilometres
   const auto largest = std::ranges::max_element(splats.primitives, {}, &GltfPrimitive::count);
   const WorldOrigin place = largest->place.translation;
   if (!IsZero(ChooseOrigin(place, kDetail))) splats.origin = place;
   int64_t far = 0;
   for (GltfPrimitive& primitive : splats.primitives) {
-    primitive.place.translation = FromOrigin(primitive.place.translation, splats.origin);
+    primitive.place.translation = RelativeToOrigin(primitive.place.translation, splats.origin);
     if (!IsZero(ChooseOrigin(primitive.place.translation, kDetail))) far += primitive.count();
   }
   if (far == 0) return;
@@ -248,7 +249,7 @@ Result<GltfSplats> FindGltfSplats(const InputFile& file, const GltfDocument& doc
       primitive.place = *place;
       splats.count += primitive.count();
       splats.degree = std::max(splats.degree, primitive.degree);
-      // Many nodes may show one mesh, so the sum can be far more than the file holds: checked as it grows.
+      // Many nodes may share a mesh, so the total can far exceed the file: check as it grows.
       ANCHORSPLAT_RETURN_IF_ERROR(CheckCount(file.name(), static_cast<uint64_t>(splats.count), limits));
       splats.primitives.push_back(std::move(primitive));
       attributes.push_back(*value.Find("attributes"));
@@ -262,7 +263,8 @@ Result<GltfSplats> FindGltfSplats(const InputFile& file, const GltfDocument& doc
                  Cat(file.name(), ": is a glTF file without splats: no node of its scene shows a primitive with ",
                      kGltfSplatting, OtherSplatExtension(document))};
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(file.name(), document.bytes(), static_cast<uint64_t>(splats.count) * 4));
+  ANCHORSPLAT_RETURN_IF_ERROR(
+      CheckCompressionRatio(file.name(), document.bytes(), static_cast<uint64_t>(splats.count) * 4));
   MoveToOrigin(file, splats);
   for (size_t k = 0; k < splats.primitives.size(); ++k) {
     ANCHORSPLAT_RETURN_IF_ERROR(FindMeanings(attributes[k], file.name(), splats.primitives[k], splats.warnings));

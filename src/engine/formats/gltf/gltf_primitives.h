@@ -19,46 +19,46 @@ namespace anchorsplat {
 
 inline constexpr const char* kGltfSplatting = "KHR_gaussian_splatting";
 
-// A primitive of splats as a node shows it, its accessors checked against each other.
+// A primitive of splats in a node, with its accessors checked against each other.
 struct GltfPrimitive {
   GltfDocument::Accessor means, quats, scales, opacities;
   std::vector<GltfDocument::Accessor> sh;  // floats, by coefficient
   int degree = 0;
   GltfPlace place;
-  bool logarithms = false, logits = false;  // in the place of lengths, of opacities (gltf_meanings.h)
-  bool linear = false;                      // its colours are linear light (linear_color.h)
-  bool other_sorting = false;               // than by the distance to the camera
+  bool logarithms = false, logits = false;  // instead of lengths, opacities (gltf_meanings.h)
+  bool linear = false;                      // colours are linear light (linear_color.h)
+  bool other_sorting = false;               // not sorted by camera distance
 
-  // Its harmonics have to be seen to know its colours, or are turned.
+  // Whether colours depend on the harmonics, or these are rotated.
   bool mixes_harmonics() const { return degree > 0 && (linear || place.turns()); }
   int64_t count() const { return means.count; }
 };
 
-// All that the scene's nodes show. The accessors are the document's.
+// All splats shown by the scene. Accessors belong to the document.
 struct GltfSplats {
   std::vector<GltfPrimitive> primitives;
-  int64_t count = 0;                  // of their Gaussians
-  int degree = 0;                     // the highest
-  WorldOrigin origin = {0, 0, 0};     // that the places of primitives are from, in the file's axes
-  std::vector<std::string> warnings;  // what is read otherwise than the file says
+  int64_t count = 0;                  // of Gaussians
+  int degree = 0;                     // highest of all
+  WorldOrigin origin = {0, 0, 0};     // of the primitives' placements, in the file's axes
+  std::vector<std::string> warnings;  // deviations from what the file states
 };
-// Errors as ReadGltf, but for those of reading.
+// Errors: those of ReadGltf except read errors.
 Result<GltfSplats> FindGltfSplats(const InputFile& file, const GltfDocument& document, const ReadLimits& limits);
 
-// What makes a primitive a splat.
+// The extension that makes a primitive a splat.
 std::optional<JsonValue> SplatExtension(const JsonValue& primitive);
 
-// The primitives of meshes. Each mesh is looked through once: a hostile file shows one with a hundred thousand
-// primitives by as many nodes.
+// Splat primitives of meshes. Each mesh is examined once: a hostile file may reference one with a hundred thousand
+// primitives from as many nodes.
 class MeshSplats {
  public:
   struct Mesh {
     std::vector<JsonValue> splats;
-    int64_t others = 0;  // primitives that are none
+    int64_t others = 0;  // other primitives
   };
   explicit MeshSplats(const GltfDocument& document) : document_(&document) {}
 
-  // Valid as long as this lives.
+  // Valid as long as this object.
   Result<const Mesh*> Find(const JsonValue& index);
 
  private:

@@ -22,7 +22,7 @@ namespace {
 
 using Accessor = GltfDocument::Accessor;
 
-// All values of an accessor to out[i·width + k].
+// Reads all values of an accessor to out[i·width + k].
 Status ReadValues(const Accessor& accessor, float* out, int64_t width) {
   const auto unpack = [&](int64_t first, int64_t last, const uint8_t* bytes) {
     UnpackGltfValues(accessor, bytes, last - first, out + first * width, width);

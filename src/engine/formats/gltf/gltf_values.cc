@@ -62,7 +62,7 @@ Status ReadGltfBytes(const Accessor& accessor, int64_t first, int64_t last, Buff
                                bytes.size());
 }
 
-// Σ' = M Σ Mᵀ with M = scale·turn: a turn that mirrors gives the same as its negative, which is a rotation.
+// Σ' = M Σ Mᵀ with M = scale·turn: a mirroring turn gives the same as its negative, which is a rotation.
 void FinishGltfRows(const GltfPrimitive& primitive, int64_t count, const GltfColumns& columns) {
   const GltfPlace& place = primitive.place;
   const bool turns = place.turns();
@@ -74,7 +74,8 @@ void FinishGltfRows(const GltfPrimitive& primitive, int64_t count, const GltfCol
     float* q = columns.quats + 4 * i;
     std::rotate(q, q + 3, q + 4);  // xyzw to wxyz
     if (turns) {
-      if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0) q[0] = 1;  // zero is no rotation, until another is added
+      // zero becomes the identity before it is composed
+      if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0) q[0] = 1;
       const std::array<double, 4> old = {q[0], q[1], q[2], q[3]};
       q[0] = static_cast<float>(p[0] * old[0] - p[1] * old[1] - p[2] * old[2] - p[3] * old[3]);
       q[1] = static_cast<float>(p[0] * old[1] + p[1] * old[0] + p[2] * old[3] - p[3] * old[2]);

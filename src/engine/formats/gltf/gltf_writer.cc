@@ -31,16 +31,16 @@ static_assert(std::endian::native == std::endian::little, "numbers are written a
 constexpr const char* kPosition = "POSITION";
 constexpr int kFloatComponent = 5126, kUnsignedShortComponent = 5123, kArrayBuffer = 34962;
 
-// One accessor and how its values come about.
+// An accessor and how to pack its values.
 struct WrittenAttribute {
   std::string name;
   const char* type;
   int component_type;
   size_t record;                                          // bytes
-  std::function<void(int64_t row, uint8_t* bytes)> pack;  // of one Gaussian
+  std::function<void(int64_t row, uint8_t* bytes)> pack;  // packs one Gaussian
 };
 
-// glTF's COLOR_0 is linear; what splats show is sRGB (IEC 61966-2-1).
+// glTF's COLOR_0 is linear; splats show sRGB (IEC 61966-2-1).
 float LinearFromSrgb(float x) {
   return x <= 0.04045f ? std::max(0.0f, x) / 12.92f : std::pow((std::min(x, 1.0f) + 0.055f) / 1.055f, 2.4f);
 }
@@ -66,7 +66,7 @@ std::vector<WrittenAttribute> Attributes(const CloudView& cloud, const AxisFlip&
                    std::memcpy(bytes, color, sizeof color);
                  }});
   out.push_back({"KHR_gaussian_splatting:ROTATION", "VEC4", kFloatComponent, 16, [&](int64_t row, uint8_t* bytes) {
-                   const std::array<float, 4> q = WithinFloats(cloud.quats.data() + 4 * row);
+                   const std::array<float, 4> q = RescaledToFloat(cloud.quats.data() + 4 * row);
                    const float norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
                    const bool has_direction = norm > 0;
                    float xyzw[4] = {0, 0, 0, has_direction ? q[0] / norm : 1.0f};
@@ -98,7 +98,7 @@ std::vector<WrittenAttribute> Attributes(const CloudView& cloud, const AxisFlip&
   return out;
 }
 
-// Of the attributes, each with its values one after the other.
+// Of the attributes, each stored contiguously.
 uint64_t BytesOf(const std::vector<WrittenAttribute>& attributes, int64_t count) {
   uint64_t size = 0;
   for (const WrittenAttribute& attribute : attributes) size += attribute.record * static_cast<uint64_t>(count);
@@ -157,13 +157,14 @@ nlohmann::json BoundsOf(const CloudView& cloud, const AxisFlip& flip) {
   return {{"min", min}, {"max", max}};
 }
 
-// Of the JSON chunk: the same for all clouds of that size, degree and credits, however many digits their bounds have.
+// Padded size of the JSON chunk: the same for all clouds of that size, degree and credits, however many digits their
+// bounds have.
 size_t JsonSize(const CloudView& cloud, int64_t count, const std::vector<WrittenAttribute>& attributes) {
   constexpr size_t kRoomForBounds = 2 * sizeof "\"min\":[,,]," + 6 * sizeof "-1.2345678901234567e-300";
   return (JsonOf(cloud, count, attributes, nlohmann::json::object()).dump().size() + kRoomForBounds + 3) / 4 * 4;
 }
 
-// The values of all attributes, one attribute after the other, from byte `at` on.
+// Writes the values of all attributes, one after another, from byte `at` on.
 Status WriteValues(OutputFile& file, uint64_t at, const CloudView& cloud, const CloudWriteOptions& options,
                    const std::vector<WrittenAttribute>& attributes) {
   const Buffer<uint32_t> order = WriteOrder(cloud, options.order, SplatOrder::kKeep);
@@ -179,7 +180,7 @@ Status WriteValues(OutputFile& file, uint64_t at, const CloudView& cloud, const 
   return {};
 }
 
-// A name as a relative URI (RFC 3986): what is neither letter, digit nor one of "-._~" as %XX, byte by byte.
+// A name as a relative URI (RFC 3986): every byte except letters, digits and "-._~" becomes %XX.
 std::string UriOf(const std::string& name) {
   constexpr std::string_view kDigits = "0123456789ABCDEF";
   std::string uri;
@@ -195,7 +196,7 @@ std::string UriOf(const std::string& name) {
   return uri;
 }
 
-constexpr uint64_t kHeads = 12 + 8 + 8;  // of the file and its two chunks
+constexpr uint64_t kHeads = 12 + 8 + 8;  // headers of the file and its two chunks
 
 }  // namespace
 

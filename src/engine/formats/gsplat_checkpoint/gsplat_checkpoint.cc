@@ -33,16 +33,16 @@ std::optional<int> DegreeOf(int64_t rest_coefficients) {
   return std::nullopt;
 }
 
-// How a trainer calls the tensors of Gaussians, and where their shapes differ.
+// A trainer's names for the tensors of Gaussians, and differences in shape.
 struct Names {
   const char* prefix;
   const char *means, *scales, *quats, *opacities;
-  const char* constant;  // of spherical harmonics
+  const char* constant;  // constant SH coefficient
   const char* rest;
   bool flat_opacities;      // [N], not [N,1]
   bool flat_constant;       // [N,3], not [N,1,3]
-  bool degree_0_is_logits;  // without view-dependent colour the constant is the colour's logit
-  bool by_place;            // names are numbers, which say little by themselves: shapes are looked at, too
+  bool degree_0_is_logits;  // at degree 0 the constant is the colour's logit
+  bool by_place;            // names are tuple indices, so shapes are checked too
 };
 constexpr Names kNames[] = {
     {"splats.", "means", "scales", "quats", "opacities", "sh0", "shN", true, false, false, false},
@@ -50,12 +50,12 @@ constexpr Names kNames[] = {
      true, true, false},
     {"pipeline._model.", "means", "scales", "quats", "opacities", "features_dc", "features_rest", false, true, true,
      false},  // nerfstudio before 1.0
-    // INRIA's torch.save((gaussians.capture(), iteration)): places of a tuple, in one beside the iteration or alone.
+    // INRIA's torch.save((gaussians.capture(), iteration)): tuple indices, with or without the iteration.
     {"0.", "1", "4", "5", "6", "2", "3", false, false, false, true},
     {"", "1", "4", "5", "6", "2", "3", false, false, false, true},
 };
 
-// Null: of none of them.
+// Null: none of them.
 const Names* NamesIn(const TensorFile& file) {
   for (const Names& names : kNames) {
     const auto find = [&](const char* tensor) { return file.Find(Cat(names.prefix, tensor)); };
@@ -74,7 +74,7 @@ void Copy(const Float32Values& from, Buffer<float>& to) {
   std::copy(from.values().begin(), from.values().end(), to.begin());
 }
 
-// World coordinates, [N,3], of a tensor in double precision, which floats may be too coarse for.
+// World coordinates [N,3] of a double-precision tensor, for which floats may be too coarse.
 Result<Buffer<double>> CopyWorld(const TensorFile& file, const TensorEntry& means) {
   const Result<Buffer<std::byte>> bytes = CopyContiguous(means);
   if (!bytes.ok()) return Error{ErrorCode::kBadFile, Cat(file.name(), ": ", bytes.error().message)};
@@ -96,10 +96,10 @@ namespace {
 
 struct Part {
   GaussianCloud cloud;
-  std::optional<int64_t> step;  // of its training, where it says that
+  std::optional<int64_t> step;  // training step, if stated
 };
 
-// Those of one file.
+// Gaussians of one file.
 Result<Part> ReadPart(const InputFile& input, const ReadLimits& limits) {
   const auto bad = [&](const std::string& what) { return Error{ErrorCode::kBadFile, Cat(input.name(), ": ", what)}; };
   Buffer<std::byte> bytes(static_cast<size_t>(input.size()));
@@ -127,7 +127,7 @@ Result<Part> ReadPart(const InputFile& input, const ReadLimits& limits) {
                    ", expected [N, 0, 3], [N, 3, 3], [N, 8, 3] or [N, 15, 3] (SH degree 0 to 3)"));
   }
 
-  // All shapes are checked before the cloud is allocated: N is only believed when six tensors really have it.
+  // Check all shapes before allocating: N is trusted only if six tensors have it.
   using Shape = std::vector<int64_t>;
   const int64_t rest_coefficients = ShCoefficients(*degree) - 1;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const TensorEntry* const world, file.Require(called(names->means), Shape{n, 3}));
@@ -188,7 +188,7 @@ Result<Part> ReadPart(const InputFile& input, const ReadLimits& limits) {
   return part;
 }
 
-// "ckpt_29999_rank" and ".pt" around the number of a process, by which a trainer calls the file of its part.
+// File name of a distributed part: "ckpt_29999_rank" and ".pt" around the rank.
 struct RankName {
   std::string before, after;
   int rank = 0;
@@ -206,8 +206,7 @@ std::optional<RankName> RankOf(const std::string& name) {
   return found;
 }
 
-// Numbers of the files beside this one that are parts of the same splat, and its own; just that where its name says
-// nothing of parts.
+// Ranks of this file and its siblings; only its own if the name has no rank.
 std::set<int> RanksBeside(const InputFile& input, const RankName& own) {
   std::set<int> ranks = {own.rank};
   std::error_code failed;

@@ -175,7 +175,7 @@ TEST(GsplatCheckpoint, PartsOfOneSplatAreReadTogether) {
     ASSERT_EQ(messages.notes().size(), 1u);
     EXPECT_THAT(messages.notes()[0], HasSubstr("3 in all (ckpt_9_rank0.pt to ckpt_9_rank2.pt); under a name without"));
   }
-  EXPECT_FALSE(CheckIsNoInput(folder / "ckpt_9_rank1.pt").ok());
+  EXPECT_FALSE(CheckNotInput(folder / "ckpt_9_rank1.pt").ok());
   EXPECT_EQ(OpenedSplat::Open(folder / "ckpt_9_rank0.pt")->bytes(), 3 * ReadTestFile("ckpt_degree1.pt").size());
   put("ckpt_9_rank4.pt", 1);
   EXPECT_THAT(ReadCloud(folder / "ckpt_9_rank0.pt").error().message,

@@ -16,7 +16,7 @@ namespace anchorsplat {
 
 namespace {
 
-// The opcodes of pickle protocol 2 that a dictionary of tensors needs.
+// Writes the pickle opcodes (protocol 2) of a dictionary of tensors.
 class PickleWriter {
  public:
   PickleWriter() { bytes_ = "\x80\x02"; }
@@ -53,7 +53,7 @@ class PickleWriter {
     std::vector<int64_t> strides(shape.size());
     for (size_t d = shape.size(); d-- > 0;) {
       strides[d] = elements;
-      elements *= std::max<int64_t>(1, shape[d]);  // as PyTorch counts the strides of empty tensors
+      elements *= std::max<int64_t>(1, shape[d]);  // PyTorch's strides of empty tensors
     }
     if (std::find(shape.begin(), shape.end(), 0) != shape.end()) elements = 0;
     Global("torch._utils", "_rebuild_tensor_v2").Op('(');
@@ -121,7 +121,7 @@ Status WriteGsplatCheckpoint(const std::filesystem::path& path, const CloudView&
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite, options.memory));
   ZipWriter zip(file);
-  // torch.load takes the folder's name from the first member and wants a version in it.
+  // torch.load takes the folder name from the first member and requires a version in it.
   ANCHORSPLAT_RETURN_IF_ERROR(zip.Add("archive/data.pkl", pickle.bytes()));
   ANCHORSPLAT_RETURN_IF_ERROR(zip.Add("archive/byteorder", "little"));
   for (size_t t = 0; t < tensors.size(); ++t) {

@@ -32,12 +32,12 @@ constexpr uint64_t kHeaderBytes = 4096;
 constexpr uint64_t kSectionHeaderBytes = 1024;
 constexpr float kDefaultShRange = 1.5f;
 
-// Bytes of the parts of a Gaussian at each compression level.
+// Bytes of a Gaussian's fields at each compression level.
 struct Level {
   size_t number;    // bytes of a scale or a component of the quaternion
   size_t mean;      // of a coordinate
   size_t harmonic;  // of an SH coefficient
-  uint32_t range;   // of 16-bit coordinates, where the section does not say
+  uint32_t range;   // default range of 16-bit coordinates
 };
 constexpr std::array<Level, 3> kLevels = {{{4, 4, 4, 1}, {2, 2, 2, 32767}, {2, 2, 1, 32767}}};
 
@@ -53,7 +53,7 @@ struct Section {
   float block_size;
   uint32_t range;
   int degree;
-  uint64_t begin;   // byte of the bucket sizes
+  uint64_t begin;   // offset of the bucket sizes
   uint64_t record;  // bytes per Gaussian
 
   uint64_t centers_begin() const { return begin + 4 * partial_buckets; }
@@ -64,7 +64,7 @@ struct Section {
 struct Ksplat {
   size_t level = 0;
   float sh_min = -kDefaultShRange, sh_max = kDefaultShRange;
-  std::array<float, 3> center{};  // where its viewer turns about; positions are not moved by it
+  std::array<float, 3> center{};  // the viewer's orbit centre; does not affect positions
   std::vector<Section> sections;
   uint64_t count = 0;
   int degree = 0;
@@ -92,7 +92,7 @@ Status ReadSectionHeader(const InputFile& file, uint64_t at, uint64_t begin, con
   section.degree = degree;
   section.begin = begin;
   section.record = 3 * level.mean + 7 * level.number + 4 + 3 * level.harmonic * (ShCoefficients(degree) - 1);
-  // Every factor has 32 bits at most and every record fewer than 256 bytes: nothing overflows 64.
+  // All factors have at most 32 bits and records fewer than 256 bytes: no 64-bit overflow.
   if (section.count > section.max_count || section.end() > file.size()) {
     return Bad(file, at,
                Cat("a section of ", section.count, " Gaussians (room for ", section.max_count,
@@ -148,10 +148,10 @@ Result<Ksplat> ReadHeaders(const InputFile& file, const ReadLimits& limits) {
   return ksplat;
 }
 
-// Which bucket a Gaussian lies in: full ones come first, then partly filled ones, whose first Gaussians `starts` tells.
+// Finds a Gaussian's bucket: full ones come first, then partly filled ones, whose first Gaussians are in `starts`.
 struct Buckets {
   std::vector<float> centers;    // [buckets,3]
-  std::vector<uint64_t> starts;  // of the partly filled ones
+  std::vector<uint64_t> starts;  // first Gaussian of each partly filled bucket
 
   const float* CenterOf(const Section& section, uint64_t i) const {
     uint64_t bucket = 0;
@@ -183,7 +183,7 @@ Result<Buckets> ReadBuckets(const InputFile& file, const Section& section) {
 }
 
 float Number(const uint8_t* bytes, size_t size) {
-  if (size == 2) return FloatFromHalf(LoadLittle<uint16_t>(bytes));
+  if (size == 2) return FloatFromHalf(LoadLittleEndian<uint16_t>(bytes));
   float value;
   std::memcpy(&value, bytes, sizeof value);
   return value;
@@ -203,7 +203,7 @@ void UnpackHarmonics(const Ksplat& ksplat, const Section& section, const uint8_t
   }
 }
 
-// The buckets of a section, none where its level has none.
+// Buckets of a section; none if its level has none.
 Result<Buckets> BucketsOf(const InputFile& file, const Ksplat& ksplat, const Section& section) {
   return kLevels[ksplat.level].mean == 2 ? ReadBuckets(file, section) : Buckets();
 }
@@ -212,8 +212,8 @@ Error LostRow(const InputFile& file, const Section& section) {
   return Bad(file, section.begin, "a Gaussian lies in no bucket of its section");
 }
 
-// Records [first, first + count) of a section to row `to` of the cloud and on, with the harmonics that it has place
-// for. Calls each(row, harmonics) with bytes of the harmonics. False where a Gaussian lies in no bucket.
+// Unpacks records [first, first + count) of a section into rows of the cloud from `to` on, with as many harmonics as it
+// holds. Calls each(row, harmonics) with the harmonics' bytes. False if a Gaussian is in no bucket.
 template <typename Each>
 bool UnpackKsplat(const Ksplat& ksplat, const Section& section, const Buckets& buckets, const uint8_t* record,
                   int64_t first, int64_t count, int64_t to, GaussianCloud& cloud, Each&& each) {
@@ -279,20 +279,21 @@ class KsplatBlocks final : public FileBlocks {
   }
 
  private:
-  Status Fill(int64_t first, int64_t last, Room& room, std::span<uint8_t> finite) override {
+  Status Fill(int64_t first, int64_t last, Scratch& scratch, std::span<uint8_t> finite) override {
     for (int64_t i = first; i < last;) {
-      // The last one that begins here: those before it that do have no rows.
+      // The last section that begins here: earlier ones that do are empty.
       const auto s = static_cast<size_t>(std::upper_bound(begins_.begin(), begins_.end(), i) - begins_.begin()) - 1;
       const Section& section = ksplat_.sections[s];
       const int64_t end = std::min(last, begins_[s] + static_cast<int64_t>(section.count));
-      ANCHORSPLAT_RETURN_IF_ERROR(FillFrom(s, i - begins_[s], end - begins_[s], i - first, room, finite));
+      ANCHORSPLAT_RETURN_IF_ERROR(FillFrom(s, i - begins_[s], end - begins_[s], i - first, scratch, finite));
       i = end;
     }
     return {};
   }
 
-  // Rows [first, last) of section s to row `to` of the room and on.
-  Status FillFrom(size_t s, int64_t first, int64_t last, int64_t to, Room& room, std::span<uint8_t> finite) const {
+  // Reads rows [first, last) of section s into scratch rows from `to` on.
+  Status FillFrom(size_t s, int64_t first, int64_t last, int64_t to, Scratch& scratch,
+                  std::span<uint8_t> finite) const {
     const Section& section = ksplat_.sections[s];
     const auto harmonics = [&](int64_t row, const uint8_t* bytes) {
       if (finite.empty() || section.degree == 0) return;
@@ -302,9 +303,9 @@ class KsplatBlocks final : public FileBlocks {
     };
     bool all = true;
     ANCHORSPLAT_RETURN_IF_ERROR(ReadRows(file_, section.data_begin(), static_cast<size_t>(section.record), first, last,
-                                         room.bytes, [&](const uint8_t* bytes, int64_t count, int64_t at) {
+                                         scratch.bytes, [&](const uint8_t* bytes, int64_t count, int64_t at) {
                                            all = all && UnpackKsplat(ksplat_, section, buckets_[s], bytes, first + at,
-                                                                     count, to + at, room.rows, harmonics);
+                                                                     count, to + at, scratch.rows, harmonics);
                                          }));
     return all ? Status() : LostRow(file_, section);
   }

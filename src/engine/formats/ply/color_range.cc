@@ -8,9 +8,9 @@
 
 namespace anchorsplat {
 
-float IntensityOfOne(std::span<const float> colors) {
+float FullIntensityOf(std::span<const float> colors) {
   constexpr float kBeyondLight = 16, kBeyondBytes = 512;
-  constexpr int64_t kShare = 100;  // one of so many is many
+  constexpr int64_t kShare = 100;  // 1 of 100 is enough
   int64_t lit = 0, beyond_one = 0, beyond_light = 0, beyond_bytes = 0, broken = 0;
   for (const float color : colors) {
     if (!std::isfinite(color) || color <= 0) continue;
@@ -26,7 +26,7 @@ float IntensityOfOne(std::span<const float> colors) {
 }
 
 void FindFullColor(const InputFile& file, const GaussianCloud& rows, PlyLayout& layout, ExtraProperties* extras) {
-  if (layout.float_color) layout.full_color = IntensityOfOne(rows.sh);  // of degree 0, as there is no f_dc
+  if (layout.float_color) layout.full_color = FullIntensityOf(rows.sh);  // degree 0, as there is no f_rest
   if (extras != nullptr) extras->full_color = layout.full_color;
   if (!layout.float_color || layout.full_color == 1) return;
   LogInfo(Cat(file.name(), ": its red green blue are floats that go beyond 1 and are read as colours from 0 to ",

@@ -9,13 +9,13 @@
 
 namespace anchorsplat {
 
-// What stands for full intensity in colours stored as floats: 1 as a rule, 255 or 65,535 where programs left the
-// numbers of bytes or of 16 bits as they were. Some beyond 1 say nothing, which bright light and rounding have; most of
-// them, or many as bright as no light is, or whole numbers only, do.
-float IntensityOfOne(std::span<const float> colors);
+// Full intensity of colours stored as floats: normally 1, but 255 or 65,535 where programs kept 8- or 16-bit values.
+// Some values above 1 are no evidence, as bright light and rounding cause them; most values, implausibly bright ones,
+// or only whole numbers are.
+float FullIntensityOf(std::span<const float> colors);
 
-// Finds layout.full_color, once the rows of a PLY are read, where floats do not say it by themselves, which a message
-// says where it is not 1; `extras`, which may be null, get it.
+// Determines layout.full_color from the rows of a PLY, if its types do not tell. A message reports values other than 1;
+// `extras`, if not null, receives it.
 void FindFullColor(const InputFile& file, const GaussianCloud& rows, PlyLayout& layout, ExtraProperties* extras);
 
 }  // namespace anchorsplat

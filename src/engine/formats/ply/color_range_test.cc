@@ -9,7 +9,7 @@ namespace anchorsplat {
 namespace {
 
 TEST(ColorRange, TellsBytesFromUnits) {
-  const auto of = [](const std::vector<float>& colors) { return IntensityOfOne(colors); };
+  const auto of = [](const std::vector<float>& colors) { return FullIntensityOf(colors); };
   EXPECT_EQ(of({}), 1);
   EXPECT_EQ(of({0, 0, 0}), 1);
   EXPECT_EQ(of({0, 1, 1, 0}), 1);

@@ -17,20 +17,20 @@ namespace anchorsplat {
 
 namespace {
 
-// The words of a text, line by line.
+// Reads words line by line.
 class WordReader {
  public:
   WordReader(const InputFile& file, const PlyHeader& header)
       : file_(&file), reader_(file, header.body), line_(header.lines + 1) {}
 
   int64_t line() const { return line_; }
-  // Moves to the next line that has a word. False at the end of the file.
+  // Moves to the next non-blank line. False at the end of the file.
   Result<bool> NextLine();
-  // The next word of the line, valid until the next call; empty at its end.
+  // The next word of the line, valid until the next call; empty at the end of the line.
   Result<std::string_view> NextWord();
 
  private:
-  static constexpr size_t kMaxWord = 64;  // no number needs more
+  static constexpr size_t kMaxWord = 64;  // enough for any number
   const InputFile* file_;
   SequentialReader reader_;
   int64_t line_;
@@ -63,7 +63,7 @@ Result<std::string_view> WordReader::NextWord() {
       const size_t blanks = std::min(text.find_first_not_of(" \t"), text.size());
       reader_.Consume(blanks);
       text.remove_prefix(blanks);
-      if (text.empty() && blanks > 0) continue;  // the block ended; there may be another
+      if (text.empty() && blanks > 0) continue;  // end of the block; try the next
     }
     const size_t end = std::min(text.find_first_of(" \t\r\n"), text.size());
     if (size + end > kMaxWord) {
@@ -80,7 +80,7 @@ Result<std::string_view> WordReader::NextWord() {
   }
 }
 
-// Whole numbers may be written as "3.0"; what is too large or too small for a double becomes ∞ or 0.
+// Integers may be written as "3.0"; values out of a double's range become ∞ or 0.
 bool ParseDouble(std::string_view word, double& value) {
   if (!word.empty() && word.front() == '+') word.remove_prefix(1);
   const auto [end, error] = FromChars(word.data(), word.data() + word.size(), value);
@@ -94,10 +94,10 @@ bool ParseFloat(std::string_view word, float& value) {
   const char* const end = word.data() + word.size();
   auto result = FromChars(word.data(), end, value);
   if (result.ec == std::errc::result_out_of_range) {
-    // Too large or too small for a float: round as binary doubles are, to infinity or towards zero.
+    // Out of a float's range: round like binary doubles, to infinity or zero.
     double wide = 0;
     result = FromChars(word.data(), end, wide);
-    // Too small for a double, too: zero. A word is too short to get there without an exponent.
+    // Below a double's range: zero. A word is too short to get there without an exponent.
     const size_t exponent = std::min(word.find_first_of("eE"), word.size() - 1);
     if (result.ec == std::errc::result_out_of_range && word.substr(exponent + 1).starts_with('-')) {
       wide = word.front() == '-' ? -0.0 : 0.0;
@@ -121,7 +121,7 @@ bool ParseAs(std::string_view word, std::byte* out) {
   return true;
 }
 
-// The value of a property that is kept as it is.
+// Stores the value of an extra property.
 bool ParseBytes(std::string_view word, PlyType type, std::byte* out) {
   float value = 0;
   switch (type) {
@@ -151,10 +151,10 @@ class RowReader {
  public:
   RowReader(const InputFile& file, const PlyHeader& header) : file_(&file), words_(file, header) {}
 
-  // One row; a value with a target is stored through `store(property, value)`.
+  // Reads one row; calls `store(property, value)` for values with a destination.
   template <typename Store>
   Status Read(const PlyElement& element, int64_t row, const Store& store);
-  // The line of the next row that there is; 0 at the end of the file.
+  // Line number of the next row; 0 at the end of the file.
   Result<int64_t> NextLine() {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const bool more, words_.NextLine());
     return more ? words_.line() : 0;
@@ -218,7 +218,7 @@ Status ReadAsciiBody(const InputFile& file, const PlyHeader& header, const PlyEl
   RowReader reader(file, header);
   for (const PlyElement& element : header.elements) {
     if (&element == &vertex) break;
-    if (element.properties.empty()) continue;  // its rows have no text, however many there are
+    if (element.properties.empty()) continue;  // its rows have no text
     for (int64_t row = 0; row < element.count; ++row) {
       ANCHORSPLAT_RETURN_IF_ERROR(reader.Read(element, row, [](size_t, std::string_view) { return true; }));
     }
@@ -227,7 +227,7 @@ Status ReadAsciiBody(const InputFile& file, const PlyHeader& header, const PlyEl
     ANCHORSPLAT_RETURN_IF_ERROR(reader.Read(vertex, row, [&](size_t p, std::string_view word) {
       if (to[p].number != nullptr) return ParseFloat(word, to[p].number[row * to[p].stride]);
       if (to[p].wide != nullptr) {
-        float rounded = 0;  // what is too large for any number is none
+        float rounded = 0;  // an overflow is not a number
         return ParseFloat(word, rounded) && ParseDouble(word, to[p].wide[row * to[p].stride]);
       }
       return to[p].bytes == nullptr || ParseBytes(word, vertex.properties[p].type, to[p].bytes + row * to[p].stride);

@@ -64,13 +64,13 @@ class PlyBlocks final : public FileBlocks {
   };
   struct Run {
     size_t offset;
-    size_t count;  // floats one behind the other
+    size_t count;  // consecutive floats
   };
-  Status Fill(int64_t first, int64_t last, Room& room, std::span<uint8_t> finite) override {
+  Status Fill(int64_t first, int64_t last, Scratch& scratch, std::span<uint8_t> finite) override {
     Buffer<float> filter(filter_ ? static_cast<size_t>(last - first) : 0);
     ANCHORSPLAT_RETURN_IF_ERROR(ReadRows(
-        file_, begin_, row_size_, first, last, room.bytes, [&](const uint8_t* bytes, int64_t count, int64_t to) {
-          Unpack(bytes, count, to, room.rows);
+        file_, begin_, row_size_, first, last, scratch.bytes, [&](const uint8_t* bytes, int64_t count, int64_t to) {
+          Unpack(bytes, count, to, scratch.rows);
           for (int64_t i = 0; filter_ && i < count; ++i) {
             std::memcpy(filter.data() + to + i, bytes + *filter_ + static_cast<size_t>(i) * row_size_, sizeof(float));
           }
@@ -78,15 +78,15 @@ class PlyBlocks final : public FileBlocks {
           const uint8_t* row = bytes;
           for (int64_t i = to; i < to + count; ++i, row += row_size_) {
             bool all = true;
-            for (const Run& run : harmonics_) all &= !HasNotFinite(row + run.offset, run.count);
+            for (const Run& run : harmonics_) all &= !HasNonFinite(row + run.offset, run.count);
             finite[static_cast<size_t>(i)] = all ? 1 : 0;
           }
         }));
-    FinishPlyRows(layout_, room.rows);
-    return filter_ ? FuseFilter(file_, filter, first, room.rows) : Status();
+    FinishPlyRows(layout_, scratch.rows);
+    return filter_ ? FuseFilter(file_, filter, first, scratch.rows) : Status();
   }
 
-  // `count` rows of the file to row `to` and on.
+  // Unpacks `count` rows of the file into rows from `to` on.
   void Unpack(const uint8_t* bytes, int64_t count, int64_t to, GaussianCloud& rows) const {
     for (const Column& column : columns_) {
       float* out = (rows.*column.array).data() + to * column.width + column.component;
@@ -95,22 +95,22 @@ class PlyBlocks final : public FileBlocks {
     }
   }
 
-  Status EndFirst() override {
+  Status EndFirstPass() override {
     WarnOfPlyDegree(file_, layout_);
-    WarnOfOddTags(file_, header_);
+    WarnOfUnknownModeTags(file_, header_);
     WarnOfSurplus(file_, header_, vertex_);
-    if (filter_) SayFilterIsFused(file_, *render_mode_);
+    if (filter_) ReportFusedFilter(file_, *render_mode_);
     return {};
   }
 
   const InputFile& file_;
   PlyHeader header_;
   PlyLayout layout_;
-  const PlyElement& vertex_;  // of header_: a vector that moves keeps its elements
-  uint64_t begin_;            // byte of the first row
+  const PlyElement& vertex_;  // of header_; moving a vector keeps its elements in place
+  uint64_t begin_;            // offset of the first row
   size_t row_size_;
   std::vector<Column> columns_;
-  std::vector<Run> harmonics_;  // those that are no columns
+  std::vector<Run> harmonics_;  // properties not stored in columns
   std::optional<size_t> filter_;
 };
 
@@ -127,7 +127,7 @@ Result<std::unique_ptr<CloudBlocks>> BlocksOfPly(const InputFile& file, const Re
     floats &= !property.list_count;
     if (layout.targets[p] || layout.filter == p) floats &= property.type == PlyType::kFloat;
   }
-  if (!floats || header.Find(kColorSpace) != nullptr) return std::unique_ptr<CloudBlocks>();  // to be read whole
+  if (!floats || header.Find(kColorSpace) != nullptr) return std::unique_ptr<CloudBlocks>();  // must be read whole
   ANCHORSPLAT_RETURN_IF_ERROR(CheckGaussianLimit(file, vertex, limits));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const uint64_t begin, BeginOfPlyRows(file, header, vertex));
   return std::unique_ptr<CloudBlocks>(std::make_unique<PlyBlocks>(file, std::move(header), layout, begin));

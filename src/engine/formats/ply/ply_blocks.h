@@ -9,9 +9,9 @@
 
 namespace anchorsplat {
 
-// What ReadPly would give, to look at block by block, read from the file each time: a few megabytes per thread and a
-// byte per Gaussian. Nothing for files that are not binary little-endian floats throughout. `file` must outlive it.
-// Errors: as of ReadPly; those of reading, and of sizes of a 3-D filter, come from ForEach.
+// The splat of ReadPly, block by block, read in every pass with a few megabytes per thread and a byte per Gaussian.
+// Null unless the file consists of binary little-endian floats. `file` must outlive it. Errors: those of ReadPly; read
+// errors and invalid 3-D filter sizes come from ForEach.
 Result<std::unique_ptr<CloudBlocks>> BlocksOfPly(const InputFile& file, const ReadLimits& limits);
 
 }  // namespace anchorsplat

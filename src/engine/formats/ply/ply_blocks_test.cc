@@ -45,7 +45,7 @@ TEST(PlyBlocks, ShowWhatReadingGives) {
   const TestFolder folder;
   for (int degree = 0; degree <= kMaxShDegree; ++degree) {
     for (const int64_t n : {int64_t{2}, int64_t{700}, 5 * kCloudBlockRows + 3}) {
-      GaussianCloud cloud = TroubledCloud(n, degree);
+      GaussianCloud cloud = CloudWithNonFinite(n, degree);
       cloud.comments = {"a comment"};
       ASSERT_TRUE(WritePly(folder / "a.ply", cloud, {.overwrite = true}).ok());
       SCOPED_TRACE(testing::Message() << n << " Gaussians of degree " << degree);
@@ -57,7 +57,7 @@ TEST(PlyBlocks, ShowWhatReadingGives) {
 // As of two files one behind the other.
 TEST(PlyBlocks, BytesThatNobodyReadsAreSaid) {
   const TestFolder folder;
-  const GaussianCloud cloud = TroubledCloud(30, 1);
+  const GaussianCloud cloud = CloudWithNonFinite(30, 1);
   ASSERT_TRUE(WritePly(folder / "a.ply", cloud).ok());
   const std::string whole = FileBytes(folder / "a.ply");
   const auto warnings = [&](const std::string& behind) {
@@ -79,7 +79,7 @@ TEST(PlyBlocks, BytesThatNobodyReadsAreSaid) {
 
 // Mip-Splatting's filter, and a property that is no float.
 std::filesystem::path WriteFiltered(const TestFolder& folder, int64_t n, int64_t bad_row) {
-  const GaussianCloud cloud = TroubledCloud(n, 1);
+  const GaussianCloud cloud = CloudWithNonFinite(n, 1);
   ExtraProperties extras;
   extras.properties = {{"label", PlyType::kUint8}, {"filter_3D", PlyType::kFloat}};
   extras.rows.resize(extras.row_size() * static_cast<size_t>(n));

@@ -10,8 +10,8 @@ namespace {
 
 std::string Thousands(uint64_t n) { return WithThousands(static_cast<int64_t>(n)); }
 
-// `count` rows of at least `row_size` bytes must fit into `available` bytes: a header may promise anything, and what it
-// promises becomes an allocation.
+// Checks that `count` rows of at least `row_size` bytes fit into `available` bytes: headers may claim anything, and
+// counts become allocations.
 Status CheckPromise(const InputFile& file, const PlyElement& element, uint64_t row_size, uint64_t begin) {
   const uint64_t available = file.size() - begin;
   if (row_size == 0 || static_cast<uint64_t>(element.count) <= available / row_size) return {};
@@ -43,9 +43,9 @@ Result<uint64_t> BeginOfPlyRows(const InputFile& file, const PlyHeader& header, 
 void WarnOfSurplus(const InputFile& file, const PlyHeader& header, const PlyElement& vertex) {
   constexpr uint64_t kLineEnd = 2;
   if (header.encoding == PlyEncoding::kAscii || &header.elements.back() != &vertex) return;
-  uint64_t end = header.body;  // the file has that much: its rows have been read
+  uint64_t end = header.body;  // within the file, as its rows were read
   for (const PlyElement& element : header.elements) {
-    if (element.has_lists()) return;  // of which nobody knows how long they are without reading them once more
+    if (element.has_lists()) return;  // their length is unknown without reading them again
     end += static_cast<uint64_t>(element.count) * element.row_size();
   }
   if (file.size() <= end + kLineEnd) return;
@@ -62,7 +62,7 @@ Status CheckGaussianLimit(const InputFile& file, const PlyElement& vertex, const
 Status ReadPlyBody(const InputFile& file, const PlyHeader& header, const PlyElement& vertex,
                    const std::function<std::vector<PlyDestination>()>& make_room) {
   if (header.encoding == PlyEncoding::kAscii) {
-    // A value is at least one digit and a blank; the very last line end may be missing.
+    // A value needs at least a digit and a separator; the last line end may be missing.
     if ((file.size() - header.body + 1) / 2 / vertex.properties.size() < static_cast<uint64_t>(vertex.count)) {
       return CheckPromise(file, vertex, 2 * vertex.properties.size(), header.body).error();
     }

@@ -12,20 +12,20 @@
 
 namespace anchorsplat {
 
-// The rows of `vertex`, an element of `header`, in whatever encoding. `make_room` is called once the file is known to
-// have the bytes for them, and gives one destination per property. Errors (kBadFile): the file is shorter than its
-// header promises, rows that are no numbers.
+// Reads the rows of `vertex`, an element of `header`, in any encoding. `make_room` is called once the file is known to
+// be long enough, and returns a destination per property. Errors (kBadFile): the file is shorter than its header
+// states, rows that are not numbers.
 Status ReadPlyBody(const InputFile& file, const PlyHeader& header, const PlyElement& vertex,
                    const std::function<std::vector<PlyDestination>()>& make_room);
 
-// The byte where the rows of `vertex` begin in a binary file. Errors: as above.
+// Offset of the first row of `vertex` in a binary file. Errors as above.
 Result<uint64_t> BeginOfPlyRows(const InputFile& file, const PlyHeader& header, const PlyElement& vertex);
 
-// Warns of bytes behind the last row of a binary file that has been read, whose last element is `vertex` and none of
-// whose elements has lists: of a second file, or of rows that the header knows nothing of. A line end is none.
+// Warns of bytes after the last row of a binary file that was read, if `vertex` is its last element and no element has
+// lists: another file, or rows unknown to the header. A line end is ignored.
 void WarnOfSurplus(const InputFile& file, const PlyHeader& header, const PlyElement& vertex);
 
-// kBadFile where the header promises more Gaussians than are wanted.
+// kBadFile: more Gaussians than `limits` allow.
 Status CheckGaussianLimit(const InputFile& file, const PlyElement& vertex, const ReadLimits& limits);
 
 }  // namespace anchorsplat

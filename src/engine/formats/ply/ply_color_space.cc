@@ -12,7 +12,7 @@ namespace anchorsplat {
 
 namespace {
 
-// The value of a property of a whole number, at its byte.
+// The integer at byte `at` of the file.
 Result<int> ByteAt(const InputFile& file, const PlyHeader& header, const PlyProperty& property, uint64_t at) {
   const auto size = static_cast<size_t>(PlyTypeSize(property.type));
   uint8_t bytes[8] = {};
@@ -22,7 +22,7 @@ Result<int> ByteAt(const InputFile& file, const PlyHeader& header, const PlyProp
   return small ? int{bytes[0]} : -1;
 }
 
-// In a file of text: the line so many before the end that is not empty. Headers of elements behind it are short.
+// The n-th last non-empty line of a text file. Elements after it have few rows.
 Result<int> LineFromEnd(const InputFile& file, int64_t line) {
   constexpr uint64_t kTail = 1 << 16;
   const uint64_t size = std::min<uint64_t>(file.size(), kTail);

@@ -8,9 +8,9 @@ namespace anchorsplat {
 
 inline constexpr const char* kColorSpace = "color_space";
 
-// Whether a PLY declares that its colours are linear light, as SHARP's do: an element `color_space` of one row with one
-// property, 0 for sRGB and 1 for linear RGB. False where there is none.
-// kBadFile: another number, a row that is not there, an element that cannot be found without reading lists.
+// Whether a PLY declares linear colours, as SHARP's do: an element `color_space` of one row and property, 0 for sRGB
+// and 1 for linear RGB. False without it. kBadFile: another value, a missing row, an element that can only be reached
+// by reading lists.
 Result<bool> HasLinearColors(const InputFile& file, const PlyHeader& header);
 
 }  // namespace anchorsplat

@@ -156,9 +156,9 @@ TEST(PlyDialects, ColoursInPlaceOfCoefficients) {
     ExtraProperties extras;
     GaussianCloud told = *ReadPlyWithExtras(InputFile::FromBytes("x.ply", bytes), {}, extras);
     EXPECT_EQ(extras.full_color, static_cast<float>(full));
-    MakeStored(told, {.color_of_one = static_cast<float>(full)}, extras.full_color);
+    ConvertToStored(told, {.max_color = static_cast<float>(full)}, extras.full_color);
     ExpectSameCloud(told, *read);
-    MakeStored(told, {.color_of_one = 2.0f * static_cast<float>(full)}, extras.full_color);
+    ConvertToStored(told, {.max_color = 2.0f * static_cast<float>(full)}, extras.full_color);
     EXPECT_NEAR(ColorFromDc(told.sh[0]), 0.5, 1e-6) << "one who knows better";
     // Where both are there, the colours are a preview of the coefficients.
     Columns both = ColumnsOf(cloud);

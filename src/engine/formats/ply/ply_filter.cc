@@ -20,7 +20,7 @@ Status FuseFilter(const InputFile& file, std::span<const float> sizes, int64_t f
   return {};
 }
 
-void SayFilterIsFused(const InputFile& file, RenderMode mode) {
+void ReportFusedFilter(const InputFile& file, RenderMode mode) {
   LogInfo(Cat(file.name(), ": Mip-Splatting's 3-D filter (", kFilter3d,
               ") is made a part of scales and opacities; the render mode is ", NameOf(mode)));
 }

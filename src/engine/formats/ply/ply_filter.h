@@ -10,12 +10,12 @@
 
 namespace anchorsplat {
 
-// Makes Mip-Splatting's smoothing filter a part of the Gaussians, as the "fused" file of its program has it: every
-// program draws those, none but its own knows the property. `rows` are those of the file from `first` on, `sizes` has
-// one for each. Errors (kBadFile): a size that is none, with its row.
+// Applies Mip-Splatting's smoothing filter to the Gaussians, as its program does for "fused" files: all programs draw
+// those, but only its own knows the property. `rows`: rows of the file from `first` on; `sizes`: one per row. Errors
+// (kBadFile): an invalid size, with its row.
 Status FuseFilter(const InputFile& file, std::span<const float> sizes, int64_t first, GaussianCloud& rows);
 
-// Says so. What trains so is drawn with compensated opacity: `mode` is what was made of that.
-void SayFilterIsFused(const InputFile& file, RenderMode mode);
+// Reports it. Such splats are drawn with compensated opacity; `mode` is the resulting render mode.
+void ReportFusedFilter(const InputFile& file, RenderMode mode);
 
 }  // namespace anchorsplat

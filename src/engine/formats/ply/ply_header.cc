@@ -45,7 +45,7 @@ class HeaderParser {
  public:
   explicit HeaderParser(std::string file) : file_(std::move(file)) {}
 
-  // One line without its end; `done()` after end_header.
+  // Handles a line without its end; `done()` is true after end_header.
   Status Line(std::string_view line);
   bool done() const { return done_; }
   PlyHeader& header() { return header_; }
@@ -65,7 +65,7 @@ class HeaderParser {
   std::string file_;
   PlyHeader header_;
   RenderModeTag mode_;
-  std::unordered_set<std::string> names_;  // of the current element's properties
+  std::unordered_set<std::string> names_;  // property names of the current element
   bool has_format_ = false;
   bool done_ = false;
 };
@@ -78,7 +78,8 @@ Status HeaderParser::Line(std::string_view line) {
     if (keyword != "ply" || !rest.empty()) return Unexpected("\"ply\" (this is no PLY file)", line);
     return {};
   }
-  if (keyword == "obj_info" && UpOf({std::string(rest)})) header_.comments.emplace_back(rest);  // the rest is not kept
+  // other obj_info is dropped
+  if (keyword == "obj_info" && UpOf({std::string(rest)})) header_.comments.emplace_back(rest);
   if (keyword.empty() || keyword == "obj_info") return {};
   if (keyword == "comment") {
     return Comment(rest);
@@ -164,7 +165,7 @@ Status HeaderParser::Comment(std::string_view rest) {
     return Bad(Cat("\"", Printable(std::string(rest)), "\" gives no origin of the positions: expected three numbers"));
   } else if (!mode_.Take(rest)) {
     header_.comments.emplace_back(rest);
-    if (LooksLikeModeTag(rest)) header_.odd_tags.emplace_back(rest);
+    if (LooksLikeModeTag(rest)) header_.unknown_mode_tags.emplace_back(rest);
   }
   header_.render_mode = mode_.mode();
   return {};
@@ -221,10 +222,10 @@ std::string PlyComments(std::span<const std::string> comments, std::optional<Ren
   return lines;
 }
 
-void WarnOfOddTags(const InputFile& file, const PlyHeader& header) {
-  if (header.odd_tags.empty()) return;
-  const int64_t more = std::ssize(header.odd_tags) - 1;
-  LogWarning(Cat(file.name(), ": comment \"", Printable(header.odd_tags.front()), "\"",
+void WarnOfUnknownModeTags(const InputFile& file, const PlyHeader& header) {
+  if (header.unknown_mode_tags.empty()) return;
+  const int64_t more = std::ssize(header.unknown_mode_tags) - 1;
+  LogWarning(Cat(file.name(), ": comment \"", Printable(header.unknown_mode_tags.front()), "\"",
                  more > 0 ? Cat(" (and ", more, " more)") : "",
                  " says no render mode that this version knows (SplatRenderMode: default or mip, SplatRenderDilation: "
                  "0.1 or 0.3, antialiased 0 or 1): the mode ",
@@ -237,8 +238,8 @@ Result<PlyHeader> ReadPlyHeader(const InputFile& file) {
   HeaderParser parser(file.name());
   std::string bytes;
   size_t at = 0;
-  bool lone_cr = false;  // old Macintosh line ends; then a LF after CR belongs to the data
-  // Most headers fit the first piece; of a long one the bytes are read again, the lines are not.
+  bool lone_cr = false;  // old Macintosh line ends; a LF after CR then belongs to the data
+  // Most headers fit in the first piece; longer ones are reread from the start, but lines are parsed once.
   for (const size_t piece : {size_t{16} << 10, kMaxPlyHeader}) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(bytes, file.Head(piece));
     if (!bytes.starts_with("ply")) {
@@ -247,7 +248,7 @@ Result<PlyHeader> ReadPlyHeader(const InputFile& file) {
     }
     while (!parser.done()) {
       const size_t end = bytes.find_first_of("\r\n", at);
-      // A CR at the end of the piece may be half of CR LF.
+      // A CR at the end of a piece may be half of a CR LF.
       if (end == std::string::npos || (bytes[end] == '\r' && end + 1 == bytes.size() && bytes.size() < file.size())) {
         break;
       }

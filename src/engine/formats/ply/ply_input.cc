@@ -54,7 +54,7 @@ Status PlyInput::Read(int64_t first, int64_t last, GaussianCloud& rows, ExtraPro
 
 void PlyInput::Warn() const {
   WarnOfPlyDegree(*file_, layout_);
-  WarnOfOddTags(*file_, header_);
+  WarnOfUnknownModeTags(*file_, header_);
   WarnOfSurplus(*file_, header_, *layout_.vertex);
 }
 

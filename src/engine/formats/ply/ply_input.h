@@ -13,23 +13,22 @@
 
 namespace anchorsplat {
 
-// What ReadPlyWithExtras gives, some rows at a time and with all their harmonics; normals that are zero throughout are
-// normals here.
+// ReadPlyWithExtras in pieces of rows, with all harmonics. Normals are kept even if all are zero.
 class PlyInput {
  public:
-  // Nothing for files whose rows cannot be told without the others: text, lists, positions in double precision, colours
-  // in the place of f_dc_*, other colour spaces, 3-D filters. `file` must outlive it. Errors: of ReadPly.
+  // Opens a file; none if its rows depend on others: text, lists, double-precision positions, colours instead of
+  // f_dc_*, other colour spaces, 3-D filters. `file` must outlive it. Errors: those of ReadPly.
   static Result<std::optional<PlyInput>> Open(const InputFile& file, const ReadLimits& limits);
 
   PlyInput(PlyInput&&) = default;
 
-  // Without rows.
+  // The splat without rows.
   const GaussianCloud& head() const { return head_; }
   const ExtraProperties& extras() const { return extras_; }
   int64_t size() const { return count_; }
-  // Rows [first, last) in place of those that `rows` and `extras` have. From several threads.
+  // Replaces the contents of `rows` and `extras` by rows [first, last). Thread-safe.
   Status Read(int64_t first, int64_t last, GaussianCloud& rows, ExtraProperties& extras) const;
-  // What reading says at its end.
+  // Warnings that the reader gives at its end.
   void Warn() const;
 
  private:
@@ -37,7 +36,7 @@ class PlyInput {
 
   const InputFile* file_;
   PlyHeader header_;
-  PlyLayout layout_;  // of header_, whose elements stay where they are when it moves
+  PlyLayout layout_;  // refers to header_, whose elements stay in place when moved
   uint64_t begin_ = 0;
   int64_t count_ = 0;
   bool has_normals_ = false;

@@ -22,7 +22,7 @@ struct Required {
   int width;
   int component;
 };
-// Width 0 stands for the row of `sh`, which depends on the degree.
+// Width 0 means the row of `sh`, which depends on the degree.
 constexpr std::array<Required, 14> kRequired = {{{"x", &GaussianCloud::means, 3, 0},
                                                  {"y", &GaussianCloud::means, 3, 1},
                                                  {"z", &GaussianCloud::means, 3, 2},
@@ -57,10 +57,10 @@ Status CheckFloating(const InputFile& file, const PlyProperty& property) {
   return {};
 }
 
-// The properties by the names that they have in INRIA's files.
+// Properties by INRIA's names.
 using Properties = std::unordered_map<std::string_view, size_t>;
 
-// CloudCompare, which knows positions and colours, puts such a word before the names of all else, at each saving anew.
+// CloudCompare knows positions and colours; it prefixes all other names, again on every save.
 std::string_view WithoutPrefix(std::string_view name) {
   for (bool any = true; any;) {
     any = false;
@@ -78,7 +78,7 @@ bool IsOfGaussians(std::string_view name) {
          std::any_of(kRequired.begin() + 3, kRequired.end(), [name](const Required& r) { return r.name == name; });
 }
 
-// The name by which a property is looked for.
+// The name to look up a property by.
 std::string_view KnownName(const PlyProperty& property) {
   const std::string_view inner = WithoutPrefix(property.name);
   return IsOfGaussians(inner) ? inner : std::string_view(property.name);
@@ -97,7 +97,7 @@ Result<Properties> FindProperties(const InputFile& file, const PlyElement& verte
   return found;
 }
 
-// What a vertex element without Gaussians is instead.
+// Describes a vertex element without Gaussians.
 Error NotASplat(const InputFile& file, const PlyHeader& header) {
   const PlyElement* face = header.Find("face");
   std::string names;
@@ -119,7 +119,7 @@ bool HasNormals(const PlyElement& vertex) {
   return std::ranges::any_of(vertex.properties, [](const PlyProperty& p) { return NormalAxis(p) >= 0; });
 }
 
-// Degree from the number of f_rest properties; their targets.
+// SH degree from the number of f_rest properties, and their targets.
 Status PlanRest(const InputFile& file, const PlyElement& vertex, PlyLayout& layout) {
   struct Rest {
     size_t property;
@@ -151,7 +151,7 @@ Status PlanRest(const InputFile& file, const PlyElement& vertex, PlyLayout& layo
   }
   layout.sh_degree = std::min(degree, kMaxShDegree);
   for (const Rest& r : rest) {
-    // Names differ, so `count` numbers below `count` are all of them.
+    // Names are unique, so `count` numbers below `count` are complete.
     if (r.index >= count) {
       const PlyProperty& property = vertex.properties[r.property];
       return Error{ErrorCode::kBadFile, Cat(Where(file, property.line), "property \"", property.name, "\" of ", count,
@@ -168,7 +168,7 @@ Status PlanRest(const InputFile& file, const PlyElement& vertex, PlyLayout& layo
   return {};
 }
 
-// What other programs have in place of what INRIA's files have. Names of it that then stand for the latter are added.
+// Detects variants of other programs, and adds their names as substitutes for INRIA's.
 void PlanDialect(const PlyElement& vertex, Properties& by_name, PlyLayout& layout) {
   const auto type_of = [&](std::string_view name) -> std::optional<PlyType> {
     const auto found = by_name.find(name);
@@ -188,7 +188,7 @@ void PlanDialect(const PlyElement& vertex, Properties& by_name, PlyLayout& layou
     for (size_t k = 0; k < kDc.size(); ++k) by_name.emplace(kDc[k], by_name.at(kColors[k]));
   }
   const std::optional<PlyType> alpha = type_of("alpha");
-  // Floats may be logits as well.
+  // Floats may be logits.
   const bool is_whole = alpha && !IsFloating(*alpha);
   if (has_shape && is_whole && !by_name.contains("opacity")) {
     layout.full_alpha = FullIntensity(*alpha);
@@ -196,7 +196,7 @@ void PlanDialect(const PlyElement& vertex, Properties& by_name, PlyLayout& layou
   }
 }
 
-// Whether whole numbers may be stored for it.
+// Whether it may be stored as integers.
 bool MayBeWhole(const PlyLayout& layout, std::string_view name) {
   return (layout.full_color > 0 && name.starts_with("f_dc_")) || (layout.full_alpha > 0 && name == "opacity");
 }
@@ -289,7 +289,7 @@ ExtraProperties PlanExtras(const PlyHeader& header, const PlyLayout& layout) {
   }
   const auto rows = static_cast<size_t>(vertex.count);
   extras.rows.resize(rows * extras.row_size());
-  if (HasNormals(vertex)) extras.normals.assign(3 * rows, 0.0f);  // an axis may be missing
+  if (HasNormals(vertex)) extras.normals.assign(3 * rows, 0.0f);  // an axis may be absent
   return extras;
 }
 

@@ -52,7 +52,7 @@ Result<PlyPoints> ReadPlyPoints(const InputFile& file, const ReadLimits& limits)
   std::array<float, 3> full = {1, 1, 1};
   for (size_t k = 0; colored && k < 3; ++k) {
     const PlyType type = vertex->properties[static_cast<size_t>(columns[3 + k])].type;
-    full[k] = IsFloating(type) ? IntensityOfOne(read.colors) : FullIntensity(type);
+    full[k] = IsFloating(type) ? FullIntensityOf(read.colors) : FullIntensity(type);
   }
   PlyPoints points;
   for (size_t i = 0; i < read.positions.size(); i += 3) {

@@ -8,15 +8,15 @@
 
 namespace anchorsplat {
 
-// A PLY of points, as structure from motion and scanners write them.
+// A PLY point cloud, as from structure from motion or scanners.
 struct PlyPoints {
   Buffer<double> positions;  // [M,3] world
-  Buffer<float> colors;      // [M,3] rgb 0–1; grey where the file has none
+  Buffer<float> colors;      // [M,3] rgb 0–1; grey if absent
 };
 
-// Properties x y z and, where there are all three, red green blue of element "vertex": whole numbers from 0 to the
-// largest of their type, or floats from 0 to 1 or, as their values show, 255 (color_range.h). Rows whose position is
-// not finite are left out. Errors (kBadFile): as of ReadPly; no x, y or z.
+// Reads x y z and, if all are present, red green blue of element "vertex": integers up to the largest of their type, or
+// floats up to 1 or, judging by the values, 255 (color_range.h). Rows with a non-finite position are dropped. Errors
+// (kBadFile): those of ReadPly; no x, y or z.
 Result<PlyPoints> ReadPlyPoints(const InputFile& file, const ReadLimits& limits = {});
 
 }  // namespace anchorsplat

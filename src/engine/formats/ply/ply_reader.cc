@@ -18,11 +18,11 @@ namespace anchorsplat {
 
 namespace {
 
-// For as many Gaussians as the file is known to hold. What goes where.
+// Destinations, allocated for the number of Gaussians that the file is known to hold.
 std::vector<PlyDestination> MakeRoom(const PlyHeader& header, const PlyLayout& layout, GaussianCloud& cloud,
                                      Buffer<double>& world, Buffer<float>& filter, ExtraProperties* extras) {
   cloud.Resize(layout.vertex->count, layout.sh_degree);
-  // Text has as many digits as its writer liked, whatever the header says.
+  // Text may have any number of digits, whatever type the header states.
   if (header.encoding == PlyEncoding::kAscii || HasDoubleMeans(layout)) world.resize(cloud.means.size());
   if (layout.filter) filter.resize(static_cast<size_t>(layout.vertex->count));
   if (extras != nullptr) *extras = PlanExtras(header, layout);
@@ -45,12 +45,12 @@ Result<GaussianCloud> Read(const InputFile& file, const ReadLimits& limits, Extr
   if (!world.empty()) MeansFromWorld(file.name(), world, cloud);
   cloud.double_means = HasDoubleMeans(layout);
   if (extras != nullptr && cloud.double_means && IsZero(header.origin)) extras->world = std::move(world);
-  // Trainers write normals of zero: there is nothing in them to keep.
+  // Trainers write zero normals, which need not be kept.
   if (extras != nullptr && std::ranges::all_of(extras->normals, [](float x) { return x == 0; })) {
     extras->normals = {};
   }
   WarnOfPlyDegree(file, layout);
-  WarnOfOddTags(file, header);
+  WarnOfUnknownModeTags(file, header);
   WarnOfSurplus(file, header, vertex);
   cloud.render_mode = header.render_mode;
   cloud.comments = std::move(header.comments);
@@ -63,7 +63,7 @@ Result<GaussianCloud> Read(const InputFile& file, const ReadLimits& limits, Extr
   if (layout.filter) {
     ANCHORSPLAT_RETURN_IF_ERROR(FuseFilter(file, filter, 0, cloud));
     if (!cloud.render_mode) cloud.render_mode = RenderMode::kMip;
-    SayFilterIsFused(file, *cloud.render_mode);
+    ReportFusedFilter(file, *cloud.render_mode);
   }
   return cloud;
 }

@@ -11,27 +11,25 @@
 
 namespace anchorsplat {
 
-// Reads a Gaussian splat from a PLY file in the INRIA convention, ASCII or binary of either byte order: properties are
-// found by name, extra ones (lists too) and extra elements are skipped. Values stay as stored: log-scales, opacity
-// logits, wxyz quaternions of any norm; doubles are rounded to float. f_rest_* (channel-major in the file) becomes
-// coefficient-major `sh`; clouds without f_rest have SH degree 0. Render mode and comments are kept. The 3-D
-// filter of Mip-Splatting's own files (property filter_3D, a size per Gaussian) becomes a part of scales and opacities,
-// and the render mode kMip where no tag says another; a message says so. A tag that names no known mode is a warning.
+// Reads a Gaussian splat from a PLY file in INRIA's convention, ASCII or binary of either byte order. Properties are
+// found by name; extra properties (including lists) and elements are skipped. Values stay as stored: log-scales,
+// opacity logits, wxyz quaternions of any norm; doubles are rounded to float. f_rest_* (channel-major in the file)
+// becomes coefficient-major `sh`; without it the SH degree is 0. Render mode and comments are kept. The 3-D filter in
+// Mip-Splatting's own files (property filter_3D, a size per Gaussian) is applied to scales and opacities, with a
+// message; the render mode is then kMip unless a tag gives another. Unknown mode tags give a warning.
 //
-// Errors (kBadFile): not a PLY, a required property missing or of list or integer type, f_rest not 0, 9, 24 or 45, no
-// Gaussians, fewer bytes than the header promises (checked before anything is allocated), more than
-// `limits.max_gaussians`, in ASCII a value that is no number (the message gives the line), a filter_3D that is no
-// size (negative, NaN or infinite).
+// Errors (kBadFile): not a PLY; a required property missing or of list or integer type; f_rest not 0, 9, 24 or 45; no
+// Gaussians; fewer bytes than the header states (checked before allocation); more than `limits.max_gaussians`; in ASCII
+// an invalid number (with its line); an invalid filter_3D (negative, NaN or infinite).
 Result<GaussianCloud> ReadPly(const InputFile& file, const ReadLimits& limits = {});
 
-// The same with what the file says of its Gaussians beside them; in ASCII these values are checked too. Errors as
-// ReadPly.
+// The same with extra properties, whose values are then also validated in ASCII. Errors: those of ReadPly.
 Result<GaussianCloud> ReadPlyWithExtras(const InputFile& file, const ReadLimits& limits, ExtraProperties& extras);
 
-// What the header says. Errors as ReadPly.
+// Count and degree from the header. Errors: those of ReadPly.
 Result<CloudExtent> ExtentOfPly(const InputFile& file);
 
-// The encoding, and what a file has beside its Gaussians. Errors as ReadPly.
+// Encoding, and contents besides Gaussians. Errors: those of ReadPly.
 Result<FormatFacts> DescribePly(const InputFile& file);
 
 }  // namespace anchorsplat

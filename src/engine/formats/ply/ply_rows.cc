@@ -28,7 +28,7 @@ bool NeedsSwap(PlyEncoding encoding) {
   return (encoding == PlyEncoding::kBigEndian) != (std::endian::native == std::endian::big);
 }
 
-// The value of a property; those of Gaussians are floats or doubles, points and normals may be anything.
+// The value of a property as a double. Gaussians have floats or doubles; points and normals may have any type.
 template <typename Number>
 Number LoadNumber(PlyType type, const char* from, bool swap) {
   switch (type) {
@@ -52,7 +52,7 @@ Number LoadNumber(PlyType type, const char* from, bool swap) {
   return 0;
 }
 
-// Kept bytes are little-endian, as the program is.
+// Extra values are stored little-endian, like the program's numbers.
 void Store(PlyType type, const char* from, bool swap, const PlyDestination& to, int64_t row) {
   if (to.number != nullptr) {
     to.number[row * to.stride] = LoadNumber<float>(type, from, swap);
@@ -65,7 +65,7 @@ void Store(PlyType type, const char* from, bool swap, const PlyDestination& to, 
   }
 }
 
-// A property that is wanted.
+// A property to read.
 struct Column {
   size_t offset;  // bytes from the row's begin
   PlyType type;
@@ -83,8 +83,8 @@ std::vector<Column> Columns(const PlyElement& vertex, const std::vector<PlyDesti
   return columns;
 }
 
-// Floats in our byte order are copied as they are, so that NaNs keep their bits. Row by row: both the source and each
-// array are walked forward.
+// Floats in our byte order are copied, so that NaNs keep their bits. Row by row, so that source and destination are
+// accessed sequentially.
 void CopyFloats(const char* rows, size_t row_size, const std::vector<Column>& columns, int64_t first, int64_t last) {
   for (int64_t i = first; i < last; ++i, rows += row_size) {
     for (const Column& c : columns) std::memcpy(c.to.number + i * c.to.stride, rows + c.offset, sizeof(float));
@@ -115,7 +115,7 @@ Status ReadFixedRows(const InputFile& file, const PlyElement& vertex, PlyEncodin
   const bool copy = !swap && std::all_of(columns.begin(), columns.end(), [](const Column& c) {
     return c.type == PlyType::kFloat && c.to.number != nullptr;
   });
-  // A block and the rows it becomes stay in the L2 cache together; a task is many blocks that share one buffer.
+  // A block and its rows fit in the L2 cache together; a task has many blocks and one buffer.
   const auto block = static_cast<int64_t>(std::max<size_t>(1, (size_t{128} << 10) / row_size));
   FirstFailure failure;
   ParallelFor(0, last_row - first_row, 32 * block, [&](int64_t first, int64_t last) {
@@ -137,7 +137,7 @@ Status ReadFixedRows(const InputFile& file, const PlyElement& vertex, PlyEncodin
 
 namespace {
 
-// Count of the list that begins here.
+// Length of the list that starts here.
 Result<uint64_t> ReadListCount(SequentialReader& reader, const InputFile& file, const PlyProperty& property,
                                bool swap) {
   const uint64_t at = reader.position();
@@ -159,7 +159,7 @@ Result<uint64_t> ReadListCount(SequentialReader& reader, const InputFile& file, 
     case PlyType::kInt32:
       count = Load<int32_t>(bytes, swap);
       break;
-    default:  // the header refuses float and double
+    default:  // the header rejects float and double
       count = Load<uint32_t>(bytes, swap);
       break;
   }

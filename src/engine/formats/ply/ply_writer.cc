@@ -20,7 +20,7 @@ static_assert(std::endian::native == std::endian::little, "rows are copied as th
 // x y z nx ny nz, f_dc and f_rest, opacity scale rot
 int64_t RowFloats(int sh_degree) { return 6 + 3 * ShCoefficients(sh_degree) + 8; }
 
-// `comments`: lines of the header.
+// `comments`: header lines.
 std::string Header(int64_t count, int sh_degree, bool double_means, const std::string& comments,
                    const ExtraProperties& extras) {
   std::string header = "ply\nformat binary_little_endian 1.0\n" + comments;
@@ -77,7 +77,7 @@ void Pack(const CloudView& cloud, int64_t first, int64_t last, float* out) {
   }
 }
 
-// Rows of `floats` values each with those of `extras` put in and behind, and with the means as doubles.
+// Interleaves rows of `floats` values with those of `extras`, and writes means as doubles.
 void PackExtras(const CloudView& cloud, const ExtraProperties& extras, int64_t first, int64_t last, float* rows,
                 size_t floats, std::byte* wide) {
   constexpr size_t kMeans = 3;  // floats before the normals
@@ -110,7 +110,7 @@ uint64_t PredictedPlySize(int64_t count, int sh_degree, std::optional<RenderMode
 uint64_t ExtraPlyBytes(const CloudView& head, int64_t count, const ExtraProperties& extras) {
   const size_t more = RowSize(head.sh_degree, head.double_means, extras) - RowSize(head.sh_degree, false, {});
   return static_cast<uint64_t>(count) * more +
-         (head.double_means ? 3 : 0);  // "double" has a letter more than "float", in x, y and z
+         (head.double_means ? 3 : 0);  // "double" is a letter longer than "float", for x, y and z
 }
 
 Status WritePly(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options) {

@@ -15,27 +15,25 @@
 
 namespace anchorsplat {
 
-// Writes a Gaussian splat as the INRIA code does: binary little-endian floats in the order x y z, nx ny nz (zeros),
-// f_dc_0..2, f_rest_* (channel-major), opacity, scale_0..2, rot_0..3. The values are the stored ones, bit by bit, but
-// for a cloud of `double_means`, whose x y z are world coordinates in double; otherwise a comment says the origin. The
-// render mode and the comments go to the header (control bytes in comments become blanks, so that they stay comments).
-// Streamed in blocks: needs no second copy of the cloud.
-// Errors: kExists, kIo, kBadArgument (arrays that disagree, no Gaussians, comments longer than a header may be).
+// Writes a Gaussian splat like INRIA's code: binary little-endian floats x y z, nx ny nz (zeros), f_dc_0..2, f_rest_*
+// (channel-major), opacity, scale_0..2, rot_0..3. Values are bit-exact as stored; with `double_means`, x y z are world
+// coordinates in double, else a comment gives the origin. The header has render mode and comments (control bytes become
+// spaces, so that they stay comments). Streamed in blocks, without a second copy of the cloud. Errors: kExists, kIo,
+// kBadArgument (inconsistent arrays, no Gaussians, comments too long for a header).
 Status WritePly(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options = {});
 
-// The same with the normals of `extras`, and its properties behind ours. kBadArgument too: it has not a row for each
-// Gaussian; names longer than a header may be.
+// The same with the normals and, after ours, the properties of `extras`. Also kBadArgument: `extras` lacks rows; names
+// too long for a header.
 Status WritePlyWithExtras(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options,
                           const ExtraProperties& extras);
 
-// The same of a splat of which only some rows are there at a time. Rows may be written in any order and from several
-// threads.
+// The same for a splat that is written in pieces, in any order and from several threads.
 class PlyOutput {
  public:
-  // `head`: what the splat is like, whose rows do not count; `extras`: what properties there will be.
+  // `head`: a cloud like the splat, whose rows are ignored; `extras`: its properties.
   static Result<PlyOutput> Create(const std::filesystem::path& path, const CloudView& head, int64_t count,
                                   const CloudWriteOptions& options, const ExtraProperties& extras);
-  // Rows [first, last) of `rows`, which are like the head, become row `to` of the file and on.
+  // Writes rows [first, last) of `rows`, which must be like `head`, as rows of the file from `to` on.
   Status Write(const CloudView& rows, const ExtraProperties& extras, int64_t first, int64_t last, int64_t to) const;
   Status Commit() { return file_.Commit(); }
   size_t row_size() const { return row_size_; }
@@ -48,12 +46,12 @@ class PlyOutput {
   size_t header_, row_size_;  // bytes
 };
 
-// Bytes of the file WritePly makes of `count` Gaussians.
+// Bytes of a file that WritePly writes.
 uint64_t PredictedPlySize(int64_t count, int sh_degree, std::optional<RenderMode> render_mode = {},
                           std::span<const std::string> comments = {});
 
-// Bytes that WritePlyWithExtras writes beyond those of `count` Gaussians like `head`, whose rows do not count, but for
-// the names of properties and the comments.
+// Bytes that WritePlyWithExtras adds for `count` Gaussians like `head` (its rows are ignored), except property names
+// and comments.
 uint64_t ExtraPlyBytes(const CloudView& head, int64_t count, const ExtraProperties& extras);
 
 }  // namespace anchorsplat

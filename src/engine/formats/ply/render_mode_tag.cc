@@ -1,8 +1,8 @@
 #include "formats/ply/render_mode_tag.h"
 
-#include <cctype>
 #include <cmath>
 
+#include "core/ascii_lower_case.h"
 #include "core/number_text.h"
 #include "core/text.h"
 #include "core/words.h"
@@ -15,12 +15,6 @@ constexpr std::string_view kModeKey = "splatrendermode:";
 constexpr std::string_view kDilationKey = "splatrenderdilation:";
 constexpr std::string_view kBrushKey = "exported from brush";
 
-std::string LowerCase(std::string_view text) {
-  std::string out(text);
-  for (char& c : out) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return out;
-}
-
 std::optional<double> PositiveNumber(std::string_view text) {
   double value = 0;
   const auto [end, error] = FromChars(text.data(), text.data() + text.size(), value);
@@ -31,7 +25,7 @@ std::optional<double> PositiveNumber(std::string_view text) {
 }  // namespace
 
 bool RenderModeTag::Take(std::string_view comment) {
-  const std::string lower = LowerCase(comment);
+  const std::string lower = AsciiLowerCase(std::string(comment));
   std::string_view rest = Trimmed(lower);
   Word word = Word::kNone;
   if (rest.starts_with(kModeKey)) {
@@ -58,7 +52,7 @@ std::optional<RenderMode> RenderModeTag::mode() const {
       return RenderMode::kAntialiased;
     case Word::kMip: {
       if (!dilation_) return by_brush_ ? RenderMode::kMip : RenderMode::kAntialiased;
-      // There are two of them; the nearer one.
+      // The nearer one of two.
       constexpr double kMiddle = 0.5 * (double{DilationOf(RenderMode::kMip)} + DilationOf(RenderMode::kAntialiased));
       return *dilation_ < kMiddle ? RenderMode::kMip : RenderMode::kAntialiased;
     }
@@ -68,10 +62,10 @@ std::optional<RenderMode> RenderModeTag::mode() const {
 }
 
 bool LooksLikeModeTag(std::string_view comment) {
-  const std::string lower = LowerCase(comment);
+  const std::string lower = AsciiLowerCase(std::string(comment));
   std::string_view rest = Trimmed(lower);
   if (rest.starts_with(kModeKey) || rest.starts_with(kDilationKey)) return true;
-  // More than one word is a sentence about something.
+  // More than one word is prose.
   return TakeWord(rest) == "antialiased" && !rest.empty() && rest.find_first_of(" \t") == rest.npos;
 }
 

@@ -9,22 +9,21 @@
 
 namespace anchorsplat {
 
-// What the comments of a PLY header say about the render mode, in any case of letters (docs/formats.md):
+// Render mode in the comments of a PLY header, case-insensitive (docs/formats.md):
 //
-//   SplatRenderMode: default     classic; Brush's words, taken over by other programs
-//   SplatRenderMode: mip         opacity is compensated, and for which dilation is another matter: Brush draws such
-//                                files with 0.1 px², others write it for gsplat's "antialiased", 0.3 px². So it is kMip
-//                                where the header also has a comment "Exported from Brush", else kAntialiased, unless
-//   SplatRenderDilation: 0.1     says so (0.3 for kAntialiased): our own word
-//   antialiased 1, antialiased 0 kAntialiased or classic; Postshot's words
+//   SplatRenderMode: default     classic; defined by Brush, adopted by other programs
+//   SplatRenderMode: mip         compensated opacity, of unspecified dilation: Brush draws such files with 0.1 px²,
+//                                others for gsplat's "antialiased", 0.3 px². So it means kMip if the header also
+//                                has a comment "Exported from Brush", else kAntialiased, unless
+//   SplatRenderDilation: 0.1     gives it (0.3 for kAntialiased): our own
+//   antialiased 1, antialiased 0 kAntialiased or classic; Postshot's
 //
-// The last one of the first, second and fourth kind counts, as in other readers: tools that rewrite a file append their
-// own.
+// The last of the first, second and fourth kind counts, as in other readers: tools that rewrite files append their own.
 class RenderModeTag {
  public:
-  // Looks at a comment (without the keyword "comment"). Whether it is one of the above, and thus no other comment.
+  // Parses a comment (without the keyword "comment"); returns whether it is one of the above.
   bool Take(std::string_view comment);
-  std::optional<RenderMode> mode() const;  // of those that were taken; nothing where none said any
+  std::optional<RenderMode> mode() const;  // mode of the parsed comments, if any
 
  private:
   enum class Word { kNone, kDefault, kMip, kAntialiased };
@@ -33,11 +32,12 @@ class RenderModeTag {
   std::optional<double> dilation_;  // px²
 };
 
-// Whether a comment that Take() did not take begins as a tag does, so that its writer meant to say something about the
-// mode: "SplatRenderMode: 2dgs", "SplatRenderDilation: wide", "antialiased yes".
+// Whether a comment that Take() rejected starts like a tag, so that it was meant as one: "SplatRenderMode: 2dgs",
+// "SplatRenderDilation: wide", "antialiased yes".
 bool LooksLikeModeTag(std::string_view comment);
 
-// The comments that say a mode, so that programs that know only Brush's or no dilation understand as much as they can.
+// Comments that record a mode, so that programs which know only Brush's tag, or no dilation, understand as much as
+// possible.
 std::vector<std::string> CommentsOf(RenderMode mode);
 
 }  // namespace anchorsplat

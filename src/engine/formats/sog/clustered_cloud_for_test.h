@@ -8,7 +8,7 @@
 
 namespace anchorsplat {
 
-// Clusters of clusters, as SH of a scene are.
+// SH in clusters of varying spread, like those of a scene.
 inline GaussianCloud Clustered(int64_t n, int degree, uint64_t seed) {
   GaussianCloud cloud = RandomCloud(n, degree, seed);
   Random random(seed + 1);

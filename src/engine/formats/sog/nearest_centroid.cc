@@ -5,7 +5,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "formats/sog/nearest_centroid.cc"
 #include <hwy/foreach_target.h>
-// After foreach_target.h, which includes this file again for each target.
+// After foreach_target.h, which includes this file once per target.
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();

@@ -4,7 +4,7 @@
 
 namespace anchorsplat {
 
-// For each of `points` vectors the index of the nearest of `centroids` (1–65,536), the first of equal ones. Vectors are
+// Finds the nearest of `entries` (1–65,536) centroids for each of `count` points; ties go to the first. Vectors are
 // rows of `width` int16 (a multiple of 16) within ±2047, so that sums of squares fit 32 bits.
 void NearestCentroids(const int16_t* points, int64_t count, const int16_t* centroids, int64_t entries, int64_t width,
                       uint16_t* nearest);

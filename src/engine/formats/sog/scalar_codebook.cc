@@ -24,7 +24,7 @@ struct Bin {
   double count = 0, sum = 0;
 };
 
-// Prefix sums over the bins that hold something, and the cost of joining a run of them.
+// Prefix sums over non-empty bins, and the cost of merging a run of them.
 struct Runs {
   std::vector<double> count, sum, squares;  // [bins + 1]
 
@@ -35,7 +35,7 @@ struct Runs {
       squares.push_back(squares.back() + bin.sum * bin.sum / bin.count);
     }
   }
-  double Cost(int first, int last) const {  // of bins [first, last)
+  double Cost(int first, int last) const {  // of merging bins [first, last)
     const auto a = static_cast<size_t>(first), b = static_cast<size_t>(last);
     const double s = sum[b] - sum[a];
     return squares[b] - squares[a] - s * s / (count[b] - count[a]);
@@ -46,8 +46,8 @@ struct Runs {
   }
 };
 
-// cost[m] of the best clustering of the first m bins with one cluster more than `before` has; begins[m] is where the
-// last one begins. For m in [low, high], knowing that it begins within [first, last].
+// Computes cost[m], that of the best clustering of the first m bins with one cluster more than in `before`, and
+// begins[m], the start of its last cluster, for m in [low, high], given that begins[m] is within [first, last].
 void SolveLayer(const Runs& runs, const std::vector<double>& before, int low, int high, int first, int last,
                 std::vector<double>& cost, std::vector<uint16_t>& begins) {
   if (low > high) return;
@@ -76,8 +76,8 @@ std::vector<Part> Collect(int64_t rows, Add&& add) {
   return parts;
 }
 
-// Where values fall: a few outliers must not make all bins wide, so most bins share the range of the middle 99.9 % (and
-// as much again on both sides), the others what lies beyond.
+// Binning of values. Outliers must not widen all bins: most cover the range of the middle 99.9 % (and as much again on
+// both sides), the rest what lies beyond.
 class BinEdges {
  public:
   BinEdges(const float* values, int64_t rows, int64_t width, int64_t stride) {

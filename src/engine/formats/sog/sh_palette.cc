@@ -16,24 +16,24 @@ namespace {
 
 constexpr int64_t kMaxWidth = 48;
 constexpr int64_t kPaletteGrain = 1 << 13;
-constexpr int64_t kBranches = 64;          // that are worked on independently, about
-constexpr int64_t kSmallBranch = 1 << 14;  // not worth a branch of its own below
+constexpr int64_t kBranches = 64;          // approximate number of independent branches
+constexpr int64_t kSmallBranch = 1 << 14;  // smaller sets are not worth a branch
 constexpr int32_t kSteps = 2047;
 
-// Centroids a vector can choose from: more in small sets, where comparing with many costs nothing.
+// Centroids that a vector chooses from: more in small sets, where comparisons are cheap.
 int64_t GroupEntries(int64_t count) { return std::clamp((int64_t{1} << 24) / count, int64_t{256}, int64_t{4096}); }
 
-// The SH vectors of a cloud as rows of `width` int16, zero beyond `values`. Made from the cloud whenever they are
-// looked at, as a copy of all of them would be 40 % of it.
+// SH vectors of a cloud as rows of `width` int16, zero beyond `values`. Computed on access, as a copy of all would take
+// 40 % of the cloud.
 struct Vectors {
   CloudView cloud;
-  float scale = 0;  // to 12 bits
+  float scale = 0;  // factor to 12 bits
   int64_t count = 0, width = 0, values = 0;
 
   void Copy(int64_t row, int16_t* out) const {
     const float* sh = cloud.sh.data() + row * cloud.sh_stride() + 3;
     constexpr float kMost = kSteps;
-    for (int64_t k = 0; k < values; ++k) {  // written so that compilers make vectors of it
+    for (int64_t k = 0; k < values; ++k) {  // vectorizable
       const float number = sh[k] == sh[k] ? sh[k] * scale : 0.0f;
       const float below = number < kMost ? number : kMost;
       const float bounded = below > -kMost ? below : -kMost;
@@ -45,7 +45,7 @@ struct Vectors {
 
 float SpreadOf(const CloudView& cloud) {
   const int64_t parts = (cloud.size() + kPaletteGrain - 1) / kPaletteGrain;
-  std::vector<std::array<double, 2>> sums(static_cast<size_t>(parts));  // squares, largest
+  std::vector<std::array<double, 2>> sums(static_cast<size_t>(parts));  // sum of squares, largest
   ParallelFor(0, cloud.size(), kPaletteGrain, [&](int64_t first, int64_t last) {
     std::array<double, 2>& sum = sums[static_cast<size_t>(first / kPaletteGrain)];
     for (int64_t i = first; i < last; ++i) {
@@ -76,21 +76,21 @@ Vectors VectorsOf(const CloudView& cloud, float spread) {
   return out;
 }
 
-// A part of a set of vectors: those at indices[begin … end).
+// A part of a set of vectors: indices[begin … end).
 struct Part {
   int64_t begin = 0, end = 0;
   double squares = 0;  // Σ |x − mean|²
-  int64_t left = -1;   // part that its first half became; the second half follows it
+  int64_t left = -1;   // index of its first half; the second follows it
 };
 
-// Splits parts of one set of vectors, in place of their indices. `Rows` gives row(index), a pointer to `width` numbers
-// that is valid until the next call.
+// Splits parts of a set by reordering indices. `Rows` provides row(index): a pointer to `width` numbers, valid until
+// the next call.
 template <typename Rows>
 class Splitter {
  public:
   Splitter(const Rows& rows, int64_t width) : rows_(rows), width_(width) {}
 
-  // Sum of squared distances to the mean, and the mean and main direction for Split().
+  // Sum of squared distances to the mean; also computes mean and main direction for Split().
   double Measure(const uint32_t* indices, int64_t count) {
     std::array<int64_t, kMaxWidth> sums{}, squares{};
     for (int64_t begin = 0; begin < count; begin += kBlock) {
@@ -118,14 +118,14 @@ class Splitter {
         widest_ = k;
       }
     }
-    // Rounding of the difference above must not make a set of equal vectors worth splitting.
+    // Rounding must not make a set of equal vectors look worth splitting.
     return total < 0.25 ? 0 : total;
   }
 
-  // Sorts the indices so that the two halves follow each other; returns the size of the first (0 < size < count for a
-  // part of positive Measure, which must have been called just before).
+  // Partitions the indices into two halves; returns the size of the first (0 < size < count if Measure, called just
+  // before, is positive).
   int64_t Split(uint32_t* indices, int64_t count) {
-    // One step of the power method from the widest coordinate: the row of the covariance.
+    // One power iteration from the widest coordinate: its row of the covariance.
     std::array<double, kMaxWidth> direction{};
     for (int64_t begin = 0; begin < count; begin += kBlock) {
       std::array<float, kMaxWidth> sum{};
@@ -150,7 +150,7 @@ class Splitter {
     };
     int64_t size = std::stable_partition(indices, indices + count, is_first) - indices;
     if (size == 0 || size == count) {
-      // Rounding, or a direction that is none: the widest coordinate always separates something.
+      // After rounding or for a zero direction: the widest coordinate always separates some.
       size = std::stable_partition(
                  indices, indices + count,
                  [&](uint32_t index) { return static_cast<float>(rows_(index)[widest_]) > mean_[widest_]; }) -
@@ -168,7 +168,7 @@ class Splitter {
   size_t widest_ = 0;
 };
 
-// Rows of the cloud.
+// Rows computed from the cloud.
 class CloudRows {
  public:
   explicit CloudRows(const Vectors& all) : all_(&all) {}
@@ -182,22 +182,22 @@ class CloudRows {
   std::array<int16_t, kMaxWidth> row_{};
 };
 
-// Rows that have been copied, for as long as much is done with them.
+// Copied rows, for repeated access.
 struct CopiedRows {
   const int16_t* first;
   int64_t width;
   const int16_t* operator()(uint32_t index) const { return first + int64_t{index} * width; }
 };
 
-// A set of vectors on its own: the tree of its splits in the order in which they were made.
+// An independent branch: the tree of its splits in the order they were made.
 struct Branch {
-  std::vector<uint32_t> rows;     // of the whole set
+  std::vector<uint32_t> rows;     // of the cloud
   std::vector<uint32_t> indices;  // into `rows`
   std::vector<Part> parts;
-  std::vector<double> gains;   // what was split 1st, 2nd, …: non-increasing
-  std::vector<int64_t> split;  // and which part that was
-  int64_t kept = 0;            // how many of the splits count
-  int64_t first_entry = 0;     // of its kept + 1 centroids
+  std::vector<double> gains;   // of the 1st, 2nd, … split: non-increasing
+  std::vector<int64_t> split;  // the part that was split
+  int64_t kept = 0;            // number of splits used
+  int64_t first_entry = 0;     // first of its kept + 1 centroids
 
   void Grow(const Vectors& all, int64_t max_leaves) {
     const auto count = static_cast<int64_t>(rows.size());
@@ -225,7 +225,7 @@ struct Branch {
       const auto left = static_cast<int64_t>(parts.size());
       parts[static_cast<size_t>(at)].left = left;
       for (const auto& [from, to] : {std::pair(part.begin, middle), std::pair(middle, part.end)}) {
-        // A half never has more than the whole; rounding must not say so, as gains have to be non-increasing.
+        // A half never exceeds the whole; enforced against rounding, as gains must be non-increasing.
         const double squares = std::min(part.squares, splitter.Measure(indices.data() + from, to - from));
         parts.push_back({from, to, squares});
         queue.push(static_cast<int64_t>(parts.size()) - 1);
@@ -235,7 +235,7 @@ struct Branch {
     }
   }
 
-  // Leaves of the tree made of the first `kept` splits; groups of up to `most` that form a subtree.
+  // Leaves of the tree of the first `kept` splits, in groups of up to `most` that form a subtree.
   struct Group {
     int64_t begin, end;           // indices
     std::vector<int64_t> leaves;  // parts
@@ -277,7 +277,7 @@ struct Branch {
   }
 };
 
-// The set in parts of at most about 1/kBranches.
+// Splits the set into parts of at most about 1/kBranches.
 std::vector<Branch> Branches(const Vectors& all) {
   std::vector<uint32_t> indices(static_cast<size_t>(all.count));
   std::iota(indices.begin(), indices.end(), 0u);
@@ -313,8 +313,8 @@ std::vector<Branch> Branches(const Vectors& all) {
   return branches;
 }
 
-// Shares the entries out: the splits with the largest gains of all branches count. Returns how many centroids there
-// are.
+// Distributes the entries: the splits with the largest gains over all branches are used. Returns the number of
+// centroids.
 int64_t KeepBestSplits(std::vector<Branch>& branches, int64_t entries) {
   struct Gain {
     double gain;
@@ -336,7 +336,7 @@ int64_t KeepBestSplits(std::vector<Branch>& branches, int64_t entries) {
   return next;
 }
 
-// k-means among the vectors and centroids of one group; writes labels and centroids.
+// k-means between the vectors and centroids of a group; writes labels and centroids.
 void Refine(const Branch& branch, const Branch::Group& group, int64_t first_entry, int iterations, const Vectors& all,
             float step, ShPalette& out) {
   const int64_t count = group.end - group.begin;
@@ -364,7 +364,7 @@ void Refine(const Branch& branch, const Branch::Group& group, int64_t first_entr
     }
     for (size_t k = 0; k < sums.size(); ++k) {
       const int64_t size = members[k / static_cast<size_t>(all.width)];
-      if (size > 0) means[k] = static_cast<double>(sums[k]) / static_cast<double>(size);  // an empty one stays
+      if (size > 0) means[k] = static_cast<double>(sums[k]) / static_cast<double>(size);  // an empty one is unchanged
       centroids[k] = static_cast<int16_t>(std::lrint(means[k]));
     }
     if (round == iterations || entries == 1) break;
@@ -391,7 +391,7 @@ ShPalette BuildShPalette(const CloudView& cloud, int64_t entries, int iterations
   ParallelFor(0, static_cast<int64_t>(branches.size()), 1, [&](int64_t first, int64_t last) {
     for (int64_t b = first; b < last; ++b) {
       Branch& branch = branches[static_cast<size_t>(b)];
-      // Some branches deserve more than their share of the entries, none much more than this.
+      // Some branches need more than their share of entries, but hardly more than this.
       const auto size = static_cast<int64_t>(branch.rows.size());
       branch.Grow(all, std::min(size, 3 * entries * size / all.count + 64));
     }

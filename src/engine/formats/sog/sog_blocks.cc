@@ -15,7 +15,7 @@ namespace anchorsplat {
 
 namespace {
 
-// Three bytes of each pixel, close together.
+// Packs three bytes of each pixel.
 Buffer<uint8_t> Rgb(const ByteImage& picture, int64_t count) {
   Buffer<uint8_t> out(static_cast<size_t>(3 * count));
   ParallelFor(0, count, 1 << 16, [&](int64_t first, int64_t last) {
@@ -48,7 +48,7 @@ class SogBlocks final : public FileBlocks, public SogVisitor {
     color_channels_ = std::move(channels);
     colors_ = std::move(picture.rgba);
   }
-  // Numbers of a table are finite, whichever they are.
+  // Table entries are always finite.
   void Harmonics(const SogChannel&, const ByteImage&, const SogPalette&) override {}
   void End(std::optional<RenderMode> mode, std::vector<std::string> comments) override {
     render_mode_ = mode;
@@ -57,8 +57,8 @@ class SogBlocks final : public FileBlocks, public SogVisitor {
   }
 
  private:
-  Status Fill(int64_t first, int64_t last, Room& room, std::span<uint8_t>) override {
-    GaussianCloud& rows = room.rows;
+  Status Fill(int64_t first, int64_t last, Scratch& scratch, std::span<uint8_t>) override {
+    GaussianCloud& rows = scratch.rows;
     const int64_t count = last - first;
     UnpackSogQuats(quats_.data() + 4 * first, count, rows.quats.data());
     UnpackSogMeans(mean_range_, means_low_.data() + 3 * first, means_high_.data() + 3 * first, 3, count,
@@ -70,7 +70,7 @@ class SogBlocks final : public FileBlocks, public SogVisitor {
 
   SogMeanRange mean_range_;
   std::vector<SogChannel> scale_channels_, color_channels_;
-  Buffer<uint8_t> quats_, colors_;                   // [N,4], and what their pictures have behind
+  Buffer<uint8_t> quats_, colors_;                   // [N,4], and padding of their images
   Buffer<uint8_t> means_low_, means_high_, scales_;  // [N,3]
 };
 

@@ -9,8 +9,8 @@
 
 namespace anchorsplat {
 
-// What ReadSog would give, to look at block by block. The pictures are decoded once, one at a time, and kept as bytes:
-// 17 per Gaussian, beside the archive. Their labels of harmonics are looked at and not kept. Errors as ReadSog.
+// The splat of ReadSog, block by block. Images are decoded once, one at a time, and kept as bytes: 17 per Gaussian
+// besides the archive. SH labels are checked and discarded. Errors: those of ReadSog.
 Result<std::unique_ptr<CloudBlocks>> BlocksOfSog(const InputFile& file, const ReadLimits& limits);
 
 }  // namespace anchorsplat

@@ -16,7 +16,7 @@ constexpr uint64_t kMaxArchive = uint64_t{8} << 30;
 constexpr uint64_t kMaxMeta = uint64_t{4} << 20;
 constexpr uint64_t kMaxPicture = uint64_t{1} << 30;
 
-// Beside meta.json there is nothing to look for in other folders.
+// Members must be in meta.json's own folder.
 bool IsPlainName(const std::string& member) {
   return !member.empty() && member.find_first_of("/\\:") == member.npos && !member.starts_with(".") &&
          member.find('\0') == member.npos;
@@ -41,7 +41,7 @@ Result<SogMembers> SogMembers::Of(const InputFile& file) {
   SogMembers members;
   members.name_ = file.name();
   if (head == "PK") {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string_view bytes, file.Whole(kMaxArchive));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string_view bytes, file.Contents(kMaxArchive));
     ANCHORSPLAT_ASSIGN_OR_RETURN(ZipReader archive, ZipReader::View(file.name(), bytes));
     members.folder_in_archive_ = FolderOfSog(archive.Members()).value_or("");
     members.archive_.emplace(std::move(archive));
@@ -76,7 +76,7 @@ Result<ByteImage> SogMembers::Picture(const JsonValue& name, int64_t min_pixels,
     ANCHORSPLAT_ASSIGN_OR_RETURN(bytes, file.ReadAll(kMaxPicture));
   }
   const std::string where = archive_ ? Cat(name_, ": ", member) : (folder_ / member).string();
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(where, bytes.size(), static_cast<uint64_t>(min_pixels) * 2));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckCompressionRatio(where, bytes.size(), static_cast<uint64_t>(min_pixels) * 2));
   return DecodeWebp(where, bytes, min_pixels, max_pixels);
 }
 

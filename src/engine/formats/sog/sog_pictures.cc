@@ -25,7 +25,7 @@ namespace {
 
 constexpr int64_t kSogReadGrain = 1 << 14;
 
-// `count` numbers of an array. A double that no float can hold would become infinite.
+// `count` numbers of an array. Rejects doubles beyond the range of floats, which would become infinite.
 Result<std::vector<double>> FloatNumbers(const JsonValue& list, size_t count) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<double> values, list.Numbers(count));
   for (const double x : values) {
@@ -51,7 +51,7 @@ SogChannel Range(double min, double max) {
   return channel;
 }
 
-// Version 2: one codebook for all channels; version 1: a range for each.
+// Version 2: one codebook for all channels; version 1: a range per channel.
 Result<std::vector<SogChannel>> Channels(const JsonValue& part, int version, size_t count) {
   if (version == 2) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const SogChannel channel, Codebook(part));
@@ -75,10 +75,10 @@ struct Sog {
   JsonValue meta;
   int version;
   int64_t count;
-  int width = 0, height = 0;  // of all pictures with a pixel per Gaussian, once one is known
+  int width = 0, height = 0;  // of all images with a pixel per Gaussian, once known
 
-  // Picture k of the part's "files". Pictures have a pixel per Gaussian and at most some rows more, all of them alike:
-  // where they are not, the files do not belong together.
+  // Image k of the part's "files". Images have a pixel per Gaussian and at most some extra rows, and all the same size;
+  // otherwise the files do not belong together.
   Result<ByteImage> Picture(const JsonValue& part, size_t k, size_t files) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue list, part.Get("files"));
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> names, list.Elements());
@@ -92,7 +92,7 @@ struct Sog {
     height = picture.height;
     return picture;
   }
-  // Version 1 says the number of Gaussians for every attribute.
+  // Version 1 gives the number of Gaussians per attribute.
   Status CheckShape(const JsonValue& part) const {
     const std::optional<JsonValue> shape = part.Find("shape");
     if (!shape) return {};
@@ -111,7 +111,7 @@ Status VisitMeans(Sog& sog, SogVisitor& visitor) {
   SogMeanRange range;
   ANCHORSPLAT_ASSIGN_OR_RETURN(range.min, mins.Numbers(3));
   ANCHORSPLAT_ASSIGN_OR_RETURN(range.max, maxs.Numbers(3));
-  // They are logarithms: e⁸⁸ is the end of what floats can hold.
+  // Logarithms: e⁸⁸ is the limit of floats.
   constexpr double kMaxLogarithm = 88;
   for (size_t k = 0; k < 3; ++k) {
     if (std::fabs(range.min[k]) > kMaxLogarithm)
@@ -150,7 +150,7 @@ Status VisitColors(Sog& sog, SogVisitor& visitor) {
   return {};
 }
 
-// The palette's picture, which also tells the degree in version 1.
+// The palette's image, which gives the degree in version 1.
 Result<SogPalette> ReadPalette(const Sog& sog, const JsonValue& part) {
   SogPalette palette;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue list, part.Get("files"));
@@ -230,7 +230,7 @@ void UnpackSogMeans(const SogMeanRange& range, const uint8_t* low, const uint8_t
 
 void UnpackSogQuats(const uint8_t* pixels, int64_t count, float* quats) {
   for (int64_t i = 0; i < count; ++i, pixels += 4, quats += 4) {
-    SmallestThree three;  // the identity where the mark is none
+    SmallestThree three;  // identity if the mark is invalid
     if (pixels[3] >= 252) {
       three.largest = pixels[3] - 252u;
       for (size_t k = 0; k < 3; ++k) three.rest[k] = (static_cast<float>(pixels[k]) / 127.5f - 1) * kSqrtHalf;
@@ -256,7 +256,7 @@ void UnpackSogColors(const std::vector<SogChannel>& channels, const uint8_t* pix
 
 namespace {
 
-// Rotations are packed in one way; the fourth byte says which component is not there.
+// Only one packing of rotations exists; the fourth byte gives the omitted component.
 Status CheckQuats(const InputFile& file, const JsonValue& part, const ByteImage& picture, int64_t count) {
   if (const std::optional<JsonValue> encoding = part.Find("encoding");
       encoding && encoding->raw() != "quaternion_packed") {
@@ -306,7 +306,7 @@ Status VisitSog(const InputFile& file, const ReadLimits& limits, SogVisitor& vis
     ANCHORSPLAT_ASSIGN_OR_RETURN(count, sizes[0].WholeNumber(1, most));
   }
   Sog sog{opened.members, meta, version, count};
-  // Pictures of the right size come before the cloud: a count alone allocates nothing.
+  // Images of the right size are checked before the cloud is allocated.
   const std::optional<JsonValue> harmonics = meta.Find("shN");
   SogPalette palette;
   if (harmonics && !harmonics->raw().is_null()) {

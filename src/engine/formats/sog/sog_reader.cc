@@ -15,7 +15,7 @@ namespace anchorsplat {
 
 namespace {
 
-// Each picture becomes numbers and goes before the next one comes.
+// Each image is converted and freed before the next.
 class SogCloud final : public SogVisitor {
  public:
   GaussianCloud Take() { return std::move(cloud_); }
@@ -81,7 +81,7 @@ Result<FormatFacts> DescribeSog(const InputFile& file) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSog opened, OpenSog(file));
   const JsonValue meta = opened.json.root();
   FormatFacts facts;
-  // Version 1 does not say its number.
+  // Version 1 has no version number.
   const std::optional<JsonValue> version = meta.Find("version");
   facts.Add("version", version ? Printable(version->raw().dump()) : "1",
             opened.members.is_archive() ? ", a ZIP archive" : ", a folder of pictures");
@@ -105,7 +105,7 @@ Result<FormatFacts> DescribeSog(const InputFile& file) {
 uint64_t SogSize(const InputFile& file) {
   uint64_t sum = file.size();
   const Result<std::string> head = file.Head(2);
-  if (!head.ok() || *head == "PK") return sum;  // an archive holds all of it
+  if (!head.ok() || *head == "PK") return sum;  // an archive is complete
   const Result<OpenedSog> opened = OpenSog(file);
   if (!opened.ok()) return sum;
   std::set<std::string> seen;

@@ -8,8 +8,8 @@
 
 namespace anchorsplat {
 
-// Reads PlayCanvas's SOG, version 2 or 1: a ZIP archive with meta.json in it, or a meta.json with the other files
-// beside it. The attributes are lossless WebP pictures whose pixels, row by row, belong to the Gaussians:
+// Reads PlayCanvas's SOG, version 2 or 1: a ZIP archive with a meta.json, or a meta.json with the other files beside
+// it. Attributes are lossless WebP images with a pixel per Gaussian, row by row:
 //
 //   means_l, means_u  low and high bytes of 16 bits per axis, in the range mins … maxs of sign(x)·ln(|x| + 1)
 //   quats             three components of q·√2, ·127.5 + 127.5, and 252 + the index of the dropped largest (0 = w)
@@ -18,17 +18,17 @@ namespace anchorsplat {
 //   shN_labels        16 bits, an entry of the palette
 //   shN_centroids     64 entries per row, a pixel per coefficient: indices into `codebook` or bytes in mins … maxs
 //
-// "model": "antialiased" becomes the render mode; without it nothing is said.
+// "model": "antialiased" sets the render mode; otherwise it is not stated.
 //
-// Errors (kBadFile): a ZIP archive, JSON or picture that is none or damaged, members missing or of the wrong kind,
-// names that lead to another folder, pictures too small or far too large for the count, labels beyond the palette, more
-// than `limits.max_gaussians`, sizes that only a decompression bomb has.
+// Errors (kBadFile): an invalid or damaged ZIP archive, JSON or image; missing members or wrong types; names in another
+// folder; images too small or far too large for the count; labels beyond the palette; more than `limits.max_gaussians`;
+// a decompression bomb.
 Result<GaussianCloud> ReadSog(const InputFile& file, const ReadLimits& limits = {});
 
-// Bytes of the file, and of the pictures beside it where it is the meta.json of a folder.
+// Bytes of the file and, for a meta.json, of the images beside it.
 uint64_t SogSize(const InputFile& file);
 
-// Version, where the members are, who wrote them, how large the palette is. Errors as ReadSog.
+// Version, location of the members, generator, palette size. Errors: those of ReadSog.
 Result<FormatFacts> DescribeSog(const InputFile& file);
 
 }  // namespace anchorsplat

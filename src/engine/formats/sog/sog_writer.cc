@@ -32,14 +32,14 @@ namespace {
 
 constexpr int64_t kSogWriteGrain = 1 << 14;
 constexpr int64_t kSogEntriesPerRow = 64;
-constexpr int64_t kMaxSide = 16383;  // of a WebP picture
-constexpr int kPaletteRounds = 8;    // further ones gain less than half a percent of the error
+constexpr int64_t kMaxSide = 16383;  // WebP limit
+constexpr int kPaletteRounds = 8;    // further ones reduce the error by less than 0.5 %
 constexpr float kMaxSogLogScale = 20;
-// The encoder works with some 50 bytes a pixel. Pictures larger than this are compressed and written one after the
-// other, so that a conversion stays within 1.3 × the cloud.
+// The encoder needs about 50 bytes per pixel. Larger images are compressed and written one by one, so that a conversion
+// stays within 1.3 × the cloud.
 constexpr int64_t kLargePicture = 1 << 20;
 
-// A picture that is drawn when its turn comes: all of them at once would be a fifth of the cloud.
+// An image that is generated on demand: all at once would take a fifth of the cloud.
 struct Picture {
   std::string name;
   std::function<ByteImage()> draw;
@@ -52,7 +52,7 @@ struct Pictures {
 
   int64_t row(int64_t i) const { return order.empty() ? i : int64_t{order[static_cast<size_t>(i)]}; }
 
-  // A picture with a pixel per Gaussian, of which pixel(row, rgba) sets what is not 0 0 0 255.
+  // An image with a pixel per Gaussian; pixel(row, rgba) sets what differs from 0 0 0 255.
   template <typename Pixel>
   ByteImage Draw(Pixel&& pixel) const {
     ByteImage image{width, height, {}};
@@ -74,7 +74,7 @@ constexpr std::array<const char*, 7> kPictures = {
 
 double LogOfMean(float x) { return std::copysign(std::log1p(std::fabs(double{x})), double{x}); }
 
-// Of the means' logarithms, per axis.
+// Range of the means' logarithms, per axis.
 struct MeanRange {
   std::array<double, 3> min{}, max{};
 };
@@ -153,7 +153,7 @@ nlohmann::json DrawColors(const Pictures& pictures, std::vector<Picture>& out) {
   return {{"codebook", codebook.values}, {"files", {"sh0.webp"}}};
 }
 
-// As many as other programs give.
+// Number of palette entries, as in other programs.
 int64_t PaletteEntries(int64_t count) {
   const auto thousands = static_cast<uint64_t>(std::max<int64_t>(1, count / 1024));
   return static_cast<int64_t>(1024 * std::min<uint64_t>(64, std::bit_floor(thousands)));
@@ -175,7 +175,7 @@ nlohmann::json DrawHarmonics(const Pictures& pictures, std::vector<Picture>& out
                                    static_cast<int>((shared->entries + kSogEntriesPerRow - 1) / kSogEntriesPerRow),
                                    {}};
                    image.rgba.assign(static_cast<size_t>(4 * image.pixels()), 255);
-                   // The pixels of an entry follow each other, and rows hold 64 entries: one run of pixels.
+                   // Entries are contiguous and rows hold 64 of them, so the image is one run of pixels.
                    for (int64_t i = 0; i < shared->entries * coefficients; ++i) {
                      for (int64_t k = 0; k < 3; ++k) {
                        image.rgba[static_cast<size_t>(4 * i + k)] =
@@ -200,14 +200,14 @@ std::span<const char* const> SogPictures(int sh_degree) { return std::span(kPict
 
 std::vector<std::filesystem::path> SogFilesBeside(const std::filesystem::path& path, int sh_degree) {
   std::vector<std::filesystem::path> names;
-  if (path.filename() != "meta.json") return names;  // all in one archive
+  if (path.filename() != "meta.json") return names;  // one archive
   for (const char* name : SogPictures(sh_degree)) names.push_back(path.parent_path() / name);
   return names;
 }
 
 Status WriteSog(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));
-  // Multiples of four, as other programs make them.
+  // Multiples of four, like other programs.
   const int64_t width = static_cast<int64_t>(std::ceil(std::sqrt(static_cast<double>(cloud.size())) / 4)) * 4;
   const int64_t height = (cloud.size() + 4 * width - 1) / (4 * width) * 4;
   if (width > kMaxSide || height > kMaxSide) {
@@ -216,7 +216,7 @@ Status WriteSog(const std::filesystem::path& path, const CloudView& cloud, const
   }
   const std::vector<std::filesystem::path> names = SogFilesBeside(path, cloud.sh_degree);
   const bool bundled = names.empty();
-  // Before the work, so that a file in the way is not found out minutes later.
+  // Checked before the work, to fail early.
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite, options.memory));
   std::vector<OutputFile> beside;
   for (const std::filesystem::path& name : names) {
@@ -227,7 +227,7 @@ Status WriteSog(const std::filesystem::path& path, const CloudView& cloud, const
   const Pictures pictures{cloud, WriteOrder(cloud, options.order, SplatOrder::kMorton), static_cast<int>(width),
                           static_cast<int>(height)};
   nlohmann::json meta = {{"version", 2}, {"asset", AssetOf(cloud.comments, cloud.origin)}, {"count", cloud.size()}};
-  if (IsCompensated(cloud.render_mode)) meta["model"] = "antialiased";  // as splat-transform has it
+  if (IsCompensated(cloud.render_mode)) meta["model"] = "antialiased";  // as in splat-transform
   std::vector<Picture> drawn;
   if (cloud.sh_degree > 0) meta["shN"] = DrawHarmonics(pictures, drawn);
   meta["means"] = DrawMeans(pictures, drawn);
@@ -249,7 +249,7 @@ Status WriteSog(const std::filesystem::path& path, const CloudView& cloud, const
     ParallelFor(0, static_cast<int64_t>(encoded.size()), 1, [&](int64_t first, int64_t last) {
       for (auto k = static_cast<size_t>(first); k < static_cast<size_t>(last); ++k) {
         encoded[k] = EncodeWebp(drawn[next + k].draw());
-        drawn[next + k].draw = {};  // with what it holds
+        drawn[next + k].draw = {};  // frees its captures
       }
     });
     for (size_t k = 0; k < encoded.size(); ++k) {
@@ -261,7 +261,7 @@ Status WriteSog(const std::filesystem::path& path, const CloudView& cloud, const
     }
   }
   if (!bundled) {
-    beside.push_back(std::move(file));  // last: pictures without it are no splat
+    beside.push_back(std::move(file));  // last: without it, images are not a splat
     return CommitTogether(beside);
   }
   ANCHORSPLAT_RETURN_IF_ERROR(archive->Finish());
@@ -281,7 +281,7 @@ uint64_t EstimatedSogSize(int64_t count, int sh_degree) {
 }
 
 Strays SogStrays(const CloudView& cloud) {
-  return FarthestToGiveUp(
+  return ChooseStrays(
       cloud, [](double reach) { return 2 * std::log1p(reach) / kMeanSteps; }, [](double reach) { return 1 + reach; });
 }
 

@@ -20,7 +20,7 @@ namespace anchorsplat {
 
 static_assert(std::endian::native == std::endian::little, "records are copied as they lie in the file");
 
-bool IsNoSplatRow(const float numbers[6]) {  // comparisons that NaN fails
+bool IsImplausibleRow(const float numbers[6]) {  // NaN fails these comparisons
   for (int k = 0; k < 3; ++k) {
     if (!(std::fabs(numbers[k]) <= kSplatExtent)) return true;
     if (!(numbers[3 + k] >= 0 && numbers[3 + k] <= kSplatExtent)) return true;
@@ -38,7 +38,7 @@ SplatTable OfEachByte(Function&& value) {
   return table;
 }
 
-// The number of Gaussians.
+// Number of Gaussians.
 Result<int64_t> CountOfSplat(const InputFile& file, const ReadLimits& limits) {
   if (file.size() == 0) {
     return Error{ErrorCode::kBadFile, Cat(file.name(), ": is empty, expected 32 bytes per Gaussian of a .splat file")};
@@ -52,14 +52,14 @@ Result<int64_t> CountOfSplat(const InputFile& file, const ReadLimits& limits) {
   return static_cast<int64_t>(file.size() / kSplatRecord);
 }
 
-// `count` records to row `to` and on; returns how many of them are those of no splat.
+// Unpacks `count` records into rows from `to` on; returns how many are implausible.
 int64_t UnpackSplat(const uint8_t* bytes, int64_t count, int64_t to, GaussianCloud& cloud) {
   static const SplatTable kLogits = OfEachByte(LogitFromOpacity), kDc = OfEachByte(DcFromColor);
-  int64_t absurd = 0;
+  int64_t implausible = 0;
   for (int64_t i = to; i < to + count; ++i, bytes += kSplatRecord) {
     float numbers[6];
     std::memcpy(numbers, bytes, sizeof numbers);
-    if (IsNoSplatRow(numbers)) ++absurd;
+    if (IsImplausibleRow(numbers)) ++implausible;
     for (int k = 0; k < 3; ++k) {
       cloud.means[static_cast<size_t>(3 * i + k)] = numbers[k];
       cloud.log_scales[static_cast<size_t>(3 * i + k)] = LogFromStoredScale(numbers[3 + k]);
@@ -70,14 +70,14 @@ int64_t UnpackSplat(const uint8_t* bytes, int64_t count, int64_t to, GaussianClo
       cloud.quats[static_cast<size_t>(4 * i + k)] = (static_cast<float>(bytes[28 + k]) - 128) / 128;
     }
   }
-  return absurd;
+  return implausible;
 }
 
-Status CheckSplatRows(const InputFile& file, int64_t absurd, int64_t count) {
-  if (2 * absurd <= count) return {};
+Status CheckSplatRows(const InputFile& file, int64_t implausible, int64_t count) {
+  if (2 * implausible <= count) return {};
   return Error{
       ErrorCode::kBadFile,
-      Cat(file.name(), ": is no .splat file: ", WithThousands(absurd), " of ", WithThousands(count),
+      Cat(file.name(), ": is no .splat file: ", WithThousands(implausible), " of ", WithThousands(count),
           " rows of 32 bytes have positions or scales that are no numbers, negative or above a million millions")};
 }
 
@@ -86,18 +86,19 @@ class SplatBlocks final : public FileBlocks {
   SplatBlocks(const InputFile& file, int64_t count) : file_(file) { size_ = count; }
 
  private:
-  Status Fill(int64_t first, int64_t last, Room& room, std::span<uint8_t> finite) override {
-    int64_t absurd = 0;
-    ANCHORSPLAT_RETURN_IF_ERROR(ReadRows(
-        file_, 0, kSplatRecord, first, last, room.bytes,
-        [&](const uint8_t* bytes, int64_t count, int64_t to) { absurd += UnpackSplat(bytes, count, to, room.rows); }));
-    if (!finite.empty()) absurd_ += absurd;
+  Status Fill(int64_t first, int64_t last, Scratch& scratch, std::span<uint8_t> finite) override {
+    int64_t implausible = 0;
+    ANCHORSPLAT_RETURN_IF_ERROR(ReadRows(file_, 0, kSplatRecord, first, last, scratch.bytes,
+                                         [&](const uint8_t* bytes, int64_t count, int64_t to) {
+                                           implausible += UnpackSplat(bytes, count, to, scratch.rows);
+                                         }));
+    if (!finite.empty()) implausible_ += implausible;
     return {};
   }
-  Status EndFirst() override { return CheckSplatRows(file_, absurd_.exchange(0), size_); }
+  Status EndFirstPass() override { return CheckSplatRows(file_, implausible_.exchange(0), size_); }
 
   const InputFile& file_;
-  std::atomic<int64_t> absurd_ = 0;  // rows of the first pass
+  std::atomic<int64_t> implausible_ = 0;  // implausible rows of the first pass
 };
 
 }  // namespace
@@ -111,7 +112,7 @@ bool LooksLikeSplat(const InputFile& file) {
   for (size_t at = 0; at < head->size(); at += kSplatRecord) {
     float numbers[6];
     std::memcpy(numbers, head->data() + at, sizeof numbers);
-    if (IsNoSplatRow(numbers)) return false;
+    if (IsImplausibleRow(numbers)) return false;
     float square = 0;
     for (size_t k = 0; k < 4; ++k) {
       const float q = (static_cast<float>(static_cast<uint8_t>((*head)[at + 28 + k])) - 128) / 128;
@@ -127,12 +128,12 @@ Result<GaussianCloud> ReadSplat(const InputFile& file, const ReadLimits& limits)
   ANCHORSPLAT_ASSIGN_OR_RETURN(const int64_t count, CountOfSplat(file, limits));
   GaussianCloud cloud;
   cloud.Resize(count, 0);
-  std::atomic<int64_t> absurd = 0;
+  std::atomic<int64_t> implausible = 0;
   ANCHORSPLAT_RETURN_IF_ERROR(
       ReadRecords(file, 0, count, kSplatRecord, [&](int64_t first, int64_t last, const uint8_t* bytes) {
-        absurd += UnpackSplat(bytes, last - first, first, cloud);
+        implausible += UnpackSplat(bytes, last - first, first, cloud);
       }));
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckSplatRows(file, absurd, count));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckSplatRows(file, implausible, count));
   return cloud;
 }
 

@@ -19,7 +19,7 @@ namespace anchorsplat {
 
 namespace {
 
-// Rows that ReadSplat would not take for Gaussians.
+// Rows that ReadSplat would find implausible.
 int64_t CountUnreadable(const CloudView& cloud) {
   constexpr int64_t kGrain = 1 << 14;
   std::atomic<int64_t> sum = 0;
@@ -31,7 +31,7 @@ int64_t CountUnreadable(const CloudView& cloud) {
         numbers[k] = cloud.means[static_cast<size_t>(3 * i + k)];
         numbers[3 + k] = std::exp(cloud.log_scales[static_cast<size_t>(3 * i + k)]);
       }
-      here += IsNoSplatRow(numbers) ? 1 : 0;
+      here += IsImplausibleRow(numbers) ? 1 : 0;
     }
     sum += here;
   });
@@ -67,7 +67,7 @@ Status WriteSplat(const std::filesystem::path& path, const CloudView& cloud, con
           }
           std::memcpy(bytes, numbers, sizeof numbers);
           bytes[27] = OpacityByte(cloud.opacity_logits[static_cast<size_t>(row)]);
-          const std::array<float, 4> q = WithinFloats(cloud.quats.data() + 4 * row);
+          const std::array<float, 4> q = RescaledToFloat(cloud.quats.data() + 4 * row);
           const float norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
           for (size_t k = 0; k < 4; ++k) {
             const float component = norm > 0 ? q[k] / norm : (k == 0 ? 1.0f : 0.0f);

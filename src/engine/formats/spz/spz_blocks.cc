@@ -21,11 +21,11 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr size_t kLooked = 5;     // sections that rows of degree 0 need: the first ones
-constexpr size_t kHarmonics = 5;  // the one that is only checked
-constexpr int64_t kBatchRows = 8 * kRowsPerRoom;
+constexpr size_t kLooked = 5;     // sections needed for degree 0: the first ones
+constexpr size_t kHarmonics = 5;  // this one is only verified
+constexpr int64_t kBatchRows = 8 * kRowsPerScratch;
 
-// Passes over decompressed bytes.
+// Skips decompressed bytes.
 Status Drain(InflatingReader& reader, uint64_t bytes) {
   std::array<uint8_t, size_t{64} << 10> scratch;
   for (uint64_t done = 0; done < bytes;) {
@@ -46,7 +46,7 @@ class SpzBlocks final : public FileBlocks {
     comments_ = CommentsOfSpzExtensions(spz_.extensions, spz_.axes);
   }
 
-  Status ForEach(const Look& look) override {
+  Status ForEach(const Visitor& visit) override {
     BeginPass();
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Readers readers, OpenReaders());
     now_ = {};
@@ -55,15 +55,15 @@ class SpzBlocks final : public FileBlocks {
       std::swap(now_, next);
       next.first = now_.last;
       next.last = std::min(next.first + kBatchRows, size_);
-      ANCHORSPLAT_RETURN_IF_ERROR(LookAndDecompress(readers, next, look));
+      ANCHORSPLAT_RETURN_IF_ERROR(VisitAndDecompress(readers, next, visit));
     } while (now_.last < size_);
     return EndPass();
   }
 
  private:
-  // By section; null where it needs no reading.
+  // Per section; null if it is not read.
   using Readers = std::array<std::unique_ptr<InflatingReader>, kSpzSections.size()>;
-  // Rows that have been decompressed.
+  // A batch of decompressed rows.
   struct Batch {
     int64_t first = 0, last = 0;
     std::array<Buffer<uint8_t>, kLooked> bytes;
@@ -84,8 +84,8 @@ class SpzBlocks final : public FileBlocks {
     return readers;
   }
 
-  // Goes through what rows of degree 0 need and keeps where its sections begin. Returns what reads the harmonics, which
-  // follow; null where there are none.
+  // Decompresses the sections for degree 0 once and stores their starts. Returns the reader of the harmonics, which
+  // follow; null without harmonics.
   Result<std::unique_ptr<InflatingReader>> FindStarts() {
     std::unique_ptr<CopyableReader> reader = spz_.stream->Copy();
     for (size_t k = 0; k < kLooked; ++k) {
@@ -97,15 +97,14 @@ class SpzBlocks final : public FileBlocks {
     return std::unique_ptr<InflatingReader>();
   }
 
-  // Calls `look` with what has been decompressed and decompresses what comes next, side by side.
-  Status LookAndDecompress(const Readers& readers, Batch& next, const Look& look) {
+  // Visits the decompressed batch while decompressing the next.
+  Status VisitAndDecompress(const Readers& readers, Batch& next, const Visitor& visit) {
     std::vector<size_t> sections;
-    for (const size_t k :
-         {kHarmonics, size_t{0}, size_t{4}, size_t{2}, size_t{3}, size_t{1}}) {  // the longest ones first
+    for (const size_t k : {kHarmonics, size_t{0}, size_t{4}, size_t{2}, size_t{3}, size_t{1}}) {  // longest first
       if (readers[k] && next.first < next.last) sections.push_back(k);
     }
     const auto streams = std::ssize(sections);
-    const int64_t rooms = (now_.last - now_.first + kRowsPerRoom - 1) / kRowsPerRoom;
+    const int64_t rooms = (now_.last - now_.first + kRowsPerScratch - 1) / kRowsPerScratch;
     std::array<Status, kSpzSections.size()> statuses;
     ParallelFor(0, streams + rooms, 1, [&](int64_t begin, int64_t end) {
       for (int64_t task = begin; task < end; ++task) {
@@ -113,9 +112,10 @@ class SpzBlocks final : public FileBlocks {
           const size_t k = sections[static_cast<size_t>(task)];
           statuses[k] = Decompress(k, *readers[k], next);
         } else {
-          const int64_t first = now_.first + (task - streams) * kRowsPerRoom;
-          Room room;
-          (void)Show(first, std::min(now_.last, first + kRowsPerRoom), room, look);  // reads nothing
+          const int64_t first = now_.first + (task - streams) * kRowsPerScratch;
+          Scratch scratch;
+          (void)VisitRows(first, std::min(now_.last, first + kRowsPerScratch), scratch,
+                          visit);  // does not read the file
         }
       }
     });
@@ -137,9 +137,9 @@ class SpzBlocks final : public FileBlocks {
     return has_end && batch.last == size_ ? reader.ExpectEnd() : Status();
   }
 
-  // Reading looks at one section after the other, this at all of them from the first row to the last.
+  // The reader processes one section after another; this processes all sections row by row.
   Status FirstError(const Status& found) const {
-    if (spz_.stream) return found;  // its other sections have been gone through
+    if (spz_.stream) return found;  // its other sections were read before
     for (size_t k = 0; k < spz_.sections(); ++k) {
       const std::unique_ptr<InflatingReader> reader = OpenZstd(file_, spz_.begins[k], spz_.begins[k + 1]);
       ANCHORSPLAT_RETURN_IF_ERROR(Drain(*reader, BytesOf(k, size_)));
@@ -148,12 +148,12 @@ class SpzBlocks final : public FileBlocks {
     return found;
   }
 
-  Status Fill(int64_t first, int64_t last, Room& room, std::span<uint8_t>) override {
+  Status Fill(int64_t first, int64_t last, Scratch& scratch, std::span<uint8_t>) override {
     for (size_t k = 0; k < kLooked; ++k) {
       const uint8_t* const bytes = now_.bytes[k].data() + BytesOf(k, first - now_.first);
-      UnpackSpz(spz_.layout, kSpzSections[k], 0, last - first, bytes, turn_.flip, room.rows);
+      UnpackSpz(spz_.layout, kSpzSections[k], 0, last - first, bytes, turn_.flip, scratch.rows);
     }
-    TurnAxes(room.rows, turn_.turn);
+    TurnAxes(scratch.rows, turn_.turn);
     return {};
   }
 
@@ -163,7 +163,7 @@ class SpzBlocks final : public FileBlocks {
 
   const InputFile& file_;
   SpzFile spz_;
-  std::array<std::unique_ptr<CopyableReader>, kLooked> starts_;  // of one stream
+  std::array<std::unique_ptr<CopyableReader>, kLooked> starts_;  // positions in the single stream
   Batch now_;
   SpzTurn turn_;
 };

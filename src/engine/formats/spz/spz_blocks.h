@@ -9,10 +9,10 @@
 
 namespace anchorsplat {
 
-// What ReadSpz would give, to look at block by block: decompressed anew each time, some hundred thousand rows at once.
-// The harmonics only the first time, to see that they are not damaged. Of a gzip stream, in which the sections lie one
-// behind the other, the state at the begin of each is kept. `file` must outlive it. Errors as ReadSpz; those of the
-// sections come from the first ForEach.
+// The splat of ReadSpz, block by block, decompressed in every pass, some hundred thousand rows at a time. Harmonics are
+// decompressed only in the first pass, to verify them. For gzip, whose sections are consecutive in one stream, the
+// decompressor state at the start of each is kept. `file` must outlive it. Errors: those of ReadSpz; section errors
+// come from the first ForEach.
 Result<std::unique_ptr<CloudBlocks>> BlocksOfSpz(const InputFile& file, const ReadLimits& limits);
 
 }  // namespace anchorsplat

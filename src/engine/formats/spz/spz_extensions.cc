@@ -21,9 +21,9 @@ static_assert(std::endian::native == std::endian::little, "records are copied as
 
 constexpr uint32_t kSafeOrbit = 0xADBE0002, kCoordinateSystem = 0xADBE0003, kGeoreference = 0x4E530001;
 constexpr size_t kSafeOrbitBytes = 12, kGeoreferenceBytes = 76;
-constexpr size_t kMostKeptBytes = 4096;  // a header of PLY has room for a mebibyte of all comments
+constexpr size_t kMostKeptBytes = 4096;  // a PLY header has room for a mebibyte of comments in total
 
-// By the record's number; 0 says nothing.
+// By code; 0 means unspecified.
 constexpr std::array<const char*, 17> kSystems = {"",    "LDB", "RDB", "LUB", "RUB", "LDF", "RDF", "LUF", "RUF",
                                                   "LBD", "RBD", "LBU", "RBU", "LFD", "RFD", "LFU", "RFU"};
 
@@ -102,11 +102,11 @@ Result<std::string> ReadSpzExtensionBytes(const std::string& where, CopyableRead
     bytes.resize(begin + kHead);
     ANCHORSPLAT_RETURN_IF_ERROR(reader.Read(bytes.data() + begin, kHead));
     uint64_t left = ValueAt<uint32_t>(bytes, begin + sizeof(uint32_t));
-    if (bytes.size() + left > kMostSpzExtensionBytes) {
+    if (bytes.size() + left > kMaxSpzExtensionBytes) {
       return Error{ErrorCode::kBadFile, Cat(where, ": has extension records of more than ",
-                                            HumanBytes(kMostSpzExtensionBytes), " behind its Gaussians")};
+                                            HumanBytes(kMaxSpzExtensionBytes), " behind its Gaussians")};
     }
-    while (left > 0) {  // piece by piece: it may promise more than there is
+    while (left > 0) {  // in pieces, as the claimed size may exceed the data
       const size_t piece = static_cast<size_t>(std::min<uint64_t>(left, 1 << 16)), end = bytes.size();
       bytes.resize(end + piece);
       ANCHORSPLAT_RETURN_IF_ERROR(reader.Read(bytes.data() + end, piece));
@@ -169,14 +169,14 @@ std::vector<SpzExtension> SpzExtensionsOf(std::span<const std::string> comments)
         good = error == std::errc() && end == begin + 2;
         extension.payload[k] = static_cast<char>(value);
       }
-      const bool fresh = out.empty() || out.back().id != id;  // one of each
+      const bool fresh = out.empty() || out.back().id != id;  // one per id
       if (good && fresh && IsKept(extension, kRub)) out.push_back(std::move(extension));
     }
   }
   return out;
 }
 
-void DropSpzPlaces(const std::string& where, std::vector<std::string>& comments) {
+void DropSpzGeoreference(const std::string& where, std::vector<std::string>& comments) {
   const std::string beginning = Cat(kSpzRecordMark, NameAndNumber(kGeoreference));
   const auto is_place = [&](const std::string& comment) { return comment.starts_with(beginning); };
   if (std::erase_if(comments, is_place) == 0) return;

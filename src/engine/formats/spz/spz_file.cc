@@ -26,7 +26,7 @@ struct SpzHeader {
 };
 static_assert(sizeof(SpzHeader) == 16);
 
-// Version 4: follows the header; streams begin after the table.
+// Version 4: after the header; streams begin after the table.
 struct TablePlace {
   uint32_t offset;
   uint32_t reserved[3];
@@ -39,7 +39,7 @@ std::string At(const InputFile& file, uint64_t byte) {
   return Cat(file.name(), ": byte ", WithThousands(static_cast<int64_t>(byte)));
 }
 
-// The layout that the header speaks of.
+// Layout from the header.
 Result<SpzLayout> CheckHeader(const InputFile& file, const SpzHeader& header, const ReadLimits& limits) {
   const auto bad = [&file](uint64_t byte, const std::string& what) {
     return Error{ErrorCode::kBadFile, Cat(At(file, byte), " of the SPZ header: ", what)};
@@ -54,7 +54,8 @@ Result<SpzLayout> CheckHeader(const InputFile& file, const SpzHeader& header, co
   layout.version = static_cast<int>(header.version);
   layout.sh_degree = header.sh_degree;
   layout.fractional_bits = header.fractional_bits;
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(file.name(), file.size(), header.count * uint64_t{layout.record_size()}));
+  ANCHORSPLAT_RETURN_IF_ERROR(
+      CheckCompressionRatio(file.name(), file.size(), header.count * uint64_t{layout.record_size()}));
   return layout;
 }
 
@@ -67,7 +68,7 @@ SpzFile FileOf(const SpzHeader& header, const SpzLayout& layout) {
   return spz;
 }
 
-// Passes over the sections of a gzip stream to what is behind them.
+// Skips the sections of a gzip stream.
 Status PassOverSections(const SpzFile& spz, CopyableReader& reader) {
   std::vector<uint8_t> scratch(size_t{64} << 10);
   for (uint64_t left = static_cast<uint64_t>(spz.count) * spz.layout.record_size(); left > 0;) {
@@ -86,7 +87,7 @@ Status TakeExtensions(const InputFile& file, uint64_t begin, const std::string& 
   return {};
 }
 
-// Versions 1 to 3, in gzip or taken out of it, or of what another program has put in its place.
+// Versions 1 to 3, in gzip, raw, or recompressed by another program.
 Result<SpzFile> OpenOneStream(const InputFile& file, std::unique_ptr<CopyableReader> reader, const ReadLimits& limits) {
   SpzHeader header;
   ANCHORSPLAT_RETURN_IF_ERROR(reader->Read(&header, sizeof header));
@@ -95,7 +96,7 @@ Result<SpzFile> OpenOneStream(const InputFile& file, std::unique_ptr<CopyableRea
   SpzFile spz = FileOf(header, layout);
   spz.reserved_used = header.streams != 0;
   if ((header.flags & kSpzHasExtensions) != 0) {
-    // They say what the numbers before them mean.
+    // They define the meaning of the preceding numbers.
     const std::unique_ptr<CopyableReader> behind = reader->Copy();
     ANCHORSPLAT_RETURN_IF_ERROR(PassOverSections(spz, *behind));
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string bytes, ReadSpzExtensionBytes(file.name(), *behind));
@@ -123,16 +124,16 @@ Result<SpzFile> OpenStreams(const InputFile& file, const ReadLimits& limits) {
   }
   spz.reserved_used = std::ranges::any_of(place.reserved, [](uint32_t word) { return word != 0; });
   constexpr uint64_t kHead = sizeof header + sizeof place;
-  if (place.offset > file.size() || place.offset - kHead > kMostSpzExtensionBytes) {
+  if (place.offset > file.size() || place.offset - kHead > kMaxSpzExtensionBytes) {
     return Error{ErrorCode::kBadFile,
                  Cat(At(file, 16), ": has its table at byte ", place.offset, " of ", file.size(), ", behind ",
-                     place.offset - kHead, " bytes of extension records (at most ", kMostSpzExtensionBytes, ")")};
+                     place.offset - kHead, " bytes of extension records (at most ", kMaxSpzExtensionBytes, ")")};
   }
   std::string records(static_cast<size_t>(place.offset - kHead), '\0');
   ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(kHead, records.data(), records.size()));
   const Status taken = TakeExtensions(file, kHead, records, spz);
   if (!taken.ok() && ((header.flags & kSpzHasExtensions) != 0 || !spz.extensions.empty())) return taken.error();
-  spz.passed_over = taken.ok() ? 0 : records.size();
+  spz.skipped_bytes = taken.ok() ? 0 : records.size();
   std::array<StreamSize, 6> sizes{};
   ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(place.offset, sizes.data(), streams * sizeof(StreamSize)));
   std::array<uint64_t, 7>& begins = spz.begins;
@@ -193,8 +194,8 @@ void WarnOfSpz(const InputFile& file, const SpzFile& spz) {
   if (spz.reserved_used) {
     LogWarning(Cat(file.name(), ": reserved bytes of the SPZ header are not zero: what they say is not heeded"));
   }
-  if (spz.passed_over > 0) {
-    LogWarning(Cat(file.name(), ": byte 32: the ", WithThousands(static_cast<int64_t>(spz.passed_over)),
+  if (spz.skipped_bytes > 0) {
+    LogWarning(Cat(file.name(), ": byte 32: the ", WithThousands(static_cast<int64_t>(spz.skipped_bytes)),
                    " bytes behind the SPZ header are no extension records: passed over"));
   }
   WarnOfSpzExtensions(file.name(), spz.extensions, spz.axes);

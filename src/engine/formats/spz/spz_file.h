@@ -15,38 +15,38 @@
 
 namespace anchorsplat {
 
-// An SPZ file whose header has been read and checked: spz_reader.h has the two kinds.
+// An SPZ file with its header read and checked (spz_reader.h describes both kinds).
 struct SpzFile {
   SpzLayout layout;
   int64_t count = 0;
   bool antialiased = false;
   uint8_t unknown_flags = 0;
-  bool reserved_used = false;  // bytes that are to be zero are not
-  uint64_t passed_over = 0;    // bytes where records would be, and are none; the header does not promise them
+  bool reserved_used = false;  // reserved bytes are not zero
+  uint64_t skipped_bytes = 0;  // unclaimed bytes that are not records
   std::vector<SpzExtension> extensions;
-  Axes axes = kRub;  // of the numbers in the file, as a record says
-  // What follows the sections of that stream has been read: records and its end.
+  Axes axes = kRub;  // of the file's numbers, from a record or the default
+  // Whether records and end of the stream after the sections have been read.
   bool end_read = false;
-  // Versions 1 to 3: the one stream of all sections, behind its header. Null for version 4:
+  // Versions 1 to 3: the stream of all sections, positioned after its header. Version 4: null.
   std::unique_ptr<CopyableReader> stream;
-  // of section k of kSpzSections are bytes begins[k] to begins[k + 1].
+  // Section k of kSpzSections is bytes begins[k] to begins[k + 1] of version 4.
   std::array<uint64_t, 7> begins{};
 
-  int sh_degree() const;    // of a cloud
-  size_t sections() const;  // those with bytes; the harmonics are the last
+  int sh_degree() const;    // of the cloud
+  size_t sections() const;  // non-empty sections; harmonics come last
 };
 
-// Errors as ReadSpz, but for those of the sections.
+// Errors: those of ReadSpz except for sections.
 Result<SpzFile> OpenSpz(const InputFile& file, const ReadLimits& limits);
 
-// From the file's axes to the cloud's: signs while it is unpacked, and the rest afterwards.
+// Conversion from the file's axes: sign changes while unpacking, and the rest afterwards.
 struct SpzTurn {
   AxisFlip flip;
   AxisTurn turn;
 };
 SpzTurn TurnOfSpz(const SpzFile& spz);
 
-// Says what of it will not be read.
+// Warns of contents that will not be read.
 void WarnOfSpz(const InputFile& file, const SpzFile& spz);
 
 }  // namespace anchorsplat

@@ -14,7 +14,7 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int64_t kSpzBlock = 1 << 15;  // Gaussians that are unpacked while they are in the cache
+constexpr int64_t kSpzBlock = 1 << 15;  // Gaussians per task, unpacked while in the cache
 constexpr int64_t kSpzGrain = 1 << 12;
 
 Status ReadSection(const SpzLayout& layout, SpzSection section, const AxisFlip& flip, InflatingReader& reader,
@@ -35,7 +35,7 @@ Status ReadGzipped(const SpzFile& spz, const AxisFlip& flip, GaussianCloud& clou
   for (size_t k = 0; k < spz.sections(); ++k) {
     ANCHORSPLAT_RETURN_IF_ERROR(ReadSection(spz.layout, kSpzSections[k], flip, *spz.stream, cloud));
   }
-  // A stream that is longer than its header says is another splat than the header's.
+  // A stream longer than its header states does not match it.
   return spz.end_read ? Status() : spz.stream->ExpectEnd();
 }
 
@@ -44,7 +44,7 @@ Status ReadStreams(const InputFile& file, const SpzFile& spz, const AxisFlip& fl
   std::array<Status, 6> statuses;
   ParallelFor(0, static_cast<int64_t>(streams), 1, [&](int64_t first, int64_t last) {
     for (auto k = static_cast<size_t>(first); k < static_cast<size_t>(last); ++k) {
-      // The last stream is by far the longest: it goes first.
+      // The last stream is by far the longest, so it starts first.
       const size_t stream = streams - 1 - k;
       const std::unique_ptr<InflatingReader> reader = OpenZstd(file, spz.begins[stream], spz.begins[stream + 1]);
       statuses[stream] = ReadSection(spz.layout, kSpzSections[stream], flip, *reader, cloud);

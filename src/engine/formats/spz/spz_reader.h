@@ -10,23 +10,22 @@
 namespace anchorsplat {
 
 // Reads Niantic's SPZ, versions 1–3 (one gzip stream: a header of 16 bytes, then the sections of spz_sections.h) and 4
-// (a header of 32 bytes that begins "NGSP", records of extensions, a table of sizes, one zstd stream per section that
-// is not empty). Axes are RUB by the specification or what the record SPZ_ADOBE_coordinate_system says
-// (spz_extensions.h), and become RDF. A set antialiased flag becomes kAntialiased; a clear one says nothing, as most
-// programs never set it. Degree 4 is read as 3; records that are not known are named in a warning.
+// (a header of 32 bytes starting with "NGSP", extension records, a table of sizes, one zstd stream per non-empty
+// section). Axes are RUB, or those of the record SPZ_ADOBE_coordinate_system (spz_extensions.h), and are converted to
+// RDF. A set antialiased flag means kAntialiased; a clear one means nothing, as most programs never set it. Degree 4 is
+// read as 3; unknown records give a warning.
 //
-// Errors (kBadFile): damaged or shorter than the header promises, another version, a fractional part of more than 24
-// bits, records that are cut or say axes that do not exist, more than `limits.max_gaussians`, sizes that only a
-// decompression bomb has.
+// Errors (kBadFile): damaged or shorter than the header states, another version, more than 24 fractional bits,
+// truncated records or invalid axes, more than `limits.max_gaussians`, a decompression bomb.
 Result<GaussianCloud> ReadSpz(const InputFile& file, const ReadLimits& limits = {});
 
-// What the header says of its Gaussians. Errors as ReadSpz.
+// Count and degree from the header. Errors: those of ReadSpz.
 Result<CloudExtent> ExtentOfSpz(const InputFile& file);
 
-// What the header and the records say: version, fractional bits, flags, axes. Errors as ReadSpz.
+// Version, fractional bits, flags, axes. Errors: those of ReadSpz.
 Result<FormatFacts> DescribeSpz(const InputFile& file);
 
-// The axes that its numbers are in. Errors as ReadSpz.
+// Axes of the file's numbers. Errors: those of ReadSpz.
 Result<Axes> DeclaredAxesOfSpz(const InputFile& file);
 
 }  // namespace anchorsplat

@@ -17,7 +17,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "rotations are copied as they lie in memory");
 
-// Wider than 0–1, so that colours which higher SH bring back into range survive.
+// Wider than 0–1, to preserve colours that higher SH bring back into range.
 constexpr float kColorScale = 0.15f * 255;
 constexpr float kRotationSteps = 511;
 
@@ -31,7 +31,7 @@ ByteTable Table(Function&& value) {
 
 float FixedPoint(const uint8_t* bytes, float step) {
   const uint32_t bits = uint32_t{bytes[0]} << 8 | uint32_t{bytes[1]} << 16 | uint32_t{bytes[2]} << 24;
-  return static_cast<float>(static_cast<int32_t>(bits) >> 8) * step;  // an arithmetic shift: the sign comes along
+  return static_cast<float>(static_cast<int32_t>(bits) >> 8) * step;  // arithmetic shift keeps the sign
 }
 
 void UnpackRotation(const SpzLayout& layout, const uint8_t* bytes, float xyzw[4]) {
@@ -66,8 +66,8 @@ uint32_t PackRotation(const float xyzw[4]) {
   return bits;
 }
 
-// To the nearest multiple of `step`, a power of two: the lower bits become zero, which is what the compressor feeds on.
-// Rounded once: rounding to whole numbers first would put values into the wrong multiple.
+// Rounds to the nearest multiple of `step`, a power of two: zeroed lower bits compress well. A single rounding:
+// rounding to integers first could give the wrong multiple.
 uint8_t QuantizeHarmonic(float value, int step) {
   const float shifted = std::isnan(value) ? 128.0f : value * 128 + 128;
   const float bounded = shifted > 0 ? (shifted < 255 ? shifted : 255.0f) : 0.0f;
@@ -109,7 +109,7 @@ void UnpackSpz(const SpzLayout& layout, SpzSection section, int64_t first, int64
       for (int64_t i = first; i < last; ++i) {
         for (size_t k = 0; k < 3; ++k, bytes += record / 3) {
           *out++ = flip.mean[k] *
-                   (layout.version == 1 ? FloatFromHalf(LoadLittle<uint16_t>(bytes)) : FixedPoint(bytes, step));
+                   (layout.version == 1 ? FloatFromHalf(LoadLittleEndian<uint16_t>(bytes)) : FixedPoint(bytes, step));
         }
       }
       return;

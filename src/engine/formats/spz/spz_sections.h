@@ -11,7 +11,7 @@
 
 namespace anchorsplat {
 
-// The body of an SPZ file: sections one after the other, each with one record per Gaussian, bytes little-endian.
+// The body of an SPZ file: consecutive sections with one little-endian record per Gaussian.
 //
 //   means      3 × 24-bit fixed point with `fractional_bits`; version 1: 3 × half float
 //   alphas     opacity·255
@@ -28,9 +28,9 @@ inline constexpr std::array<SpzSection, 6> kSpzSections = {SpzSection::kMeans,  
 inline constexpr uint32_t kSpzMagic = 0x5053474e;  // "NGSP"
 inline constexpr uint8_t kSpzAntialiased = 1;      // bits of the header's flags
 inline constexpr uint8_t kSpzHasExtensions = 2;
-inline constexpr int kMaxSpzShDegree = 4;  // one more than a cloud has: its coefficients are dropped
+inline constexpr int kMaxSpzShDegree = 4;  // one more than a cloud; its coefficients are dropped
 
-// What the header says about the sections.
+// Properties of the sections, from the header.
 struct SpzLayout {
   int version = 4;
   int sh_degree = 0;  // in the file
@@ -40,12 +40,13 @@ struct SpzLayout {
   size_t record_size() const;                    // of all sections
 };
 
-// Records [first, last) of a section into the cloud, which has its final size. `flip` goes from the file's axes.
+// Unpacks records [first, last) of a section into the cloud, which has its final size. `flip` converts from the file's
+// axes.
 void UnpackSpz(const SpzLayout& layout, SpzSection section, int64_t first, int64_t last, const uint8_t* bytes,
                const AxisFlip& flip, GaussianCloud& cloud);
 
-// The other way, version 3 on; record i is Gaussian order[i], or i when `order` is empty. `flip` goes to the file's
-// axes.
+// The inverse, from version 3 on; record i is Gaussian order[i], or i if `order` is empty. `flip` converts to the
+// file's axes.
 void PackSpz(const SpzLayout& layout, SpzSection section, int64_t first, int64_t last, const CloudView& cloud,
              std::span<const uint32_t> order, const AxisFlip& flip, uint8_t* bytes);
 

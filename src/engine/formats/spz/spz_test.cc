@@ -207,10 +207,10 @@ TEST(Spz, HalfFloats) {
        {std::pair(0x0000, 0.0f), std::pair(0x3c00, 1.0f), std::pair(0xc000, -2.0f), std::pair(0x7bff, 65504.0f),
         std::pair(0x0001, 5.9604645e-8f), std::pair(0x0400, 6.1035156e-5f), std::pair(0x7c00, INFINITY)}) {
     const uint8_t bytes[2] = {static_cast<uint8_t>(bits), static_cast<uint8_t>(bits >> 8)};
-    EXPECT_EQ(FloatFromHalf(LoadLittle<uint16_t>(bytes)), value);
+    EXPECT_EQ(FloatFromHalf(LoadLittleEndian<uint16_t>(bytes)), value);
   }
   const uint8_t nan[2] = {1, 0x7c};
-  EXPECT_TRUE(std::isnan(FloatFromHalf(LoadLittle<uint16_t>(nan))));
+  EXPECT_TRUE(std::isnan(FloatFromHalf(LoadLittleEndian<uint16_t>(nan))));
 }
 
 TEST(Spz, RefusesDamageLiesAndBombs) {
@@ -297,7 +297,7 @@ TEST(Spz, AxesThatARecordDeclares) {
     const Axes axes = *AxesFromName(systems[k]);
     // Stored along these axes: the writer takes RDF to RUB.
     GaussianCloud stored = cloud;
-    TurnAxes(stored, Both(TurnBetween(kRdf, axes), TurnBetween(kRub, kRdf)));
+    TurnAxes(stored, Concatenate(TurnBetween(kRdf, axes), TurnBetween(kRub, kRdf)));
     for (const int version : {3, 4}) {
       const std::string bytes = WithRecords(stored, version, Record(kSystem, Number(k + 1)));
       const InputFile file = InputFile::FromBytes("a.spz", bytes);

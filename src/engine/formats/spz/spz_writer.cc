@@ -30,13 +30,13 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "headers are written as they lie in memory");
 
-// Level 4 spends about as long on a splat as packing it does; beyond, each level doubles the time for 1 % of the size.
+// Level 4 takes about as long as packing; each further level doubles the time for 1 % of the size.
 constexpr int kZstdLevel = 4;
 constexpr int kDeflateLevel = 6;
-constexpr size_t kBlockBytes = size_t{1} << 20;  // that are packed, and for version 3 deflated, by one task
+constexpr size_t kBlockBytes = size_t{1} << 20;  // packed, and for version 3 deflated, per task
 constexpr int64_t kBlocksAtOnce = 16;
 
-constexpr int kUsualBits = 12;  // of other programs
+constexpr int kUsualBits = 12;  // as in other programs
 constexpr float kMaxFixed = (1 << 23) - 1;
 
 struct MeansInSpz {
@@ -63,7 +63,7 @@ struct Packer {
   const CloudView& cloud;
   SpzLayout layout;
   Buffer<uint32_t> order;
-  std::string records = {};  // of extensions
+  std::string records = {};  // extension records
   AxisFlip flip = FlipBetween(kRdf, kRub);
 
   void Pack(SpzSection section, int64_t first, int64_t last, uint8_t* bytes) const {
@@ -84,7 +84,7 @@ std::string HeaderOf(const Packer& packer) {
   return header;
 }
 
-// ---- version 3: one gzip stream of blocks that are deflated at the same time
+// ---- version 3: one gzip stream of blocks deflated in parallel
 
 struct GzipBlock {
   SpzSection section;
@@ -97,7 +97,8 @@ struct Deflated {
   size_t raw = 0;
 };
 
-// A raw deflate stream that ends on a byte, without the final block unless `final`: such streams can be joined.
+// A raw deflate stream that ends on a byte boundary, with a final block only if `final`: such streams can be
+// concatenated.
 void Deflate(const uint8_t* raw, size_t size, bool final, Deflated& out) {
   z_stream stream{};
   if (deflateInit2(&stream, kDeflateLevel, Z_DEFLATED, -MAX_WBITS, 9, Z_DEFAULT_STRATEGY) != Z_OK)
@@ -174,8 +175,8 @@ Status WriteZstdStream(const Packer& packer, SpzSection section, OutputFile& fil
   size.raw = static_cast<uint64_t>(packer.cloud.size()) * record;
   size.compressed = 0;
   ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, kZstdLevel);
-  // The library's own threads, also when there is only one: its jobs, and so the bytes, are the same for any number.
-  // A library without threads refuses, and its bytes differ; nothing else does.
+  // Always uses the library's threads: its jobs, and so the bytes, are the same for any number of them. Only a library
+  // without threads gives other bytes.
   ZSTD_CCtx_setParameter(context.get(), ZSTD_c_nbWorkers, std::clamp(ThreadCount(), 1, 16));
   ZSTD_CCtx_setPledgedSrcSize(context.get(), size.raw);
 
@@ -248,10 +249,10 @@ uint64_t EstimatedSpzSize(int64_t count, int sh_degree) {
 
 Strays SpzStrays(const CloudView& cloud) {
   const auto step = [](double reach) {
-    if (reach > double{kMaxFixed}) return std::numeric_limits<double>::infinity();  // nothing fits
+    if (reach > double{kMaxFixed}) return std::numeric_limits<double>::infinity();  // no number of bits suffices
     return std::ldexp(1.0, -std::clamp(reach > 0 ? 22 - std::ilogb(reach) : kUsualBits, 0, kUsualBits));
   };
-  return FarthestToGiveUp(cloud, step, [](double) { return 1.0; });
+  return ChooseStrays(cloud, step, [](double) { return 1.0; });
 }
 
 std::string SpzMeanLoss(const CloudView& cloud) {
@@ -263,7 +264,7 @@ std::string SpzMeanLoss(const CloudView& cloud) {
   const double step = std::ldexp(1.0, -means.fractional_bits);
   if (means.fractional_bits >= kUsualBits) return {};
   const MiddleOfMeans middle = FindMiddleOfMeans(cloud);
-  constexpr double kFine = 1 << 14;  // steps across a scene that nobody sees
+  constexpr double kFine = 1 << 14;  // steps across a scene, too fine to see
   if (step * kFine <= double{middle.extent}) return {};
   return Cat("positions are rounded to 1/", 1 << means.fractional_bits, " instead of 1/4096, as coordinates reach ",
              means.largest, " while 98 % of the Gaussians lie within a box of ", middle.extent,

@@ -21,19 +21,19 @@ namespace {
 
 constexpr int64_t kMergeGrain = 1 << 10;
 constexpr size_t kNeighbours = 8;
-// Of the Gaussians that there are, so many at most disappear before the neighbours are looked for anew.
+// At most this fraction is merged before neighbours are searched again.
 constexpr int64_t kMergedAtOnce = 4;  // one in four
-// Nothing is thinner or wider: what SOG holds, and squares stay numbers.
+// Bounds of scales: the range of SOG, where squares stay finite.
 constexpr double kMostLogScale = 20;
-// Of a colour's standard deviation within a Gaussian, 0–1: differences below it cost next to nothing.
+// Assumed standard deviation of colour within a Gaussian, 0–1: smaller differences cost almost nothing.
 constexpr double kColorDeviation = 0.1;
-// What lies side by side and is opaque weighs more than one opaque Gaussian of its moments, which would leave gaps
-// between itself and the next one: it grows, but what lies over each other is no reason to grow without end.
+// Adjacent opaque Gaussians weigh more than one opaque Gaussian of their moments, which would leave gaps: it grows, but
+// limited, as overlapping Gaussians need no growth.
 constexpr double kMostGrowth = 1.2;
 
 using Symmetric = std::array<double, 6>;  // xx xy xz yy yz zz
 
-// Surface of an ellipsoid by Thomsen's formula, within 1.1 %.
+// Surface of an ellipsoid by Thomsen's formula (error below 1.1 %).
 double SurfaceOf(const std::array<double, 3>& lengths) {
   constexpr double kPower = 1.6075;
   const double a = std::pow(lengths[0], kPower), b = std::pow(lengths[1], kPower), c = std::pow(lengths[2], kPower);
@@ -49,7 +49,7 @@ struct Merged {
 struct Pair {
   double cost;
   int64_t first, second;
-  // A total order: the same pairs whatever sorted them.
+  // A total order, so that any sort gives the same pairs.
   bool operator<(const Pair& other) const {
     if (cost != other.cost) return cost < other.cost;
     return first != other.first ? first < other.first : second < other.second;
@@ -75,15 +75,15 @@ Merged MomentsOf(const CloudView& cloud, int64_t row) {
   return out;
 }
 
-// ln|Σ + ground·I|: details that are small beside the distance of neighbours are not seen from where a merged Gaussian
-// is.
+// ln|Σ + ground·I|: details small compared to the distance of neighbours are invisible from where a merged Gaussian is
+// seen.
 double LogDeterminant(const Symmetric& s, double ground) {
   const double xx = s[0] + ground, yy = s[3] + ground, zz = s[5] + ground;
   const double det = xx * (yy * zz - s[4] * s[4]) - s[1] * (s[1] * zz - s[4] * s[2]) + s[2] * (s[1] * s[4] - yy * s[2]);
   return std::log(std::max(det, ground * ground * ground));
 }
 
-// Of the first one, 0–1; one half where neither is seen.
+// Share of the first, 0–1; one half if neither is visible.
 double ShareOf(const Merged& a, const Merged& b) {
   const double sum = a.weight + b.weight;
   return sum > 0 ? a.weight / sum : 0.5;
@@ -141,7 +141,7 @@ class Reduction {
     return std::isfinite(cost) ? cost : std::numeric_limits<double>::max();
   }
 
-  // All pairs of near neighbours with what merging them costs.
+  // All pairs of near neighbours with their merge cost.
   std::vector<Pair> Pairs() {
     Buffer<float> means(static_cast<size_t>(3 * size()));
     for (size_t i = 0; i < moments_.size(); ++i) {
@@ -166,7 +166,7 @@ class Reduction {
       for (auto i = static_cast<size_t>(first); i < static_cast<size_t>(last); ++i)
         logs_[i] = LogDeterminant(moments_[i].covariance, ground);
     });
-    // A pair of mutual neighbours is listed by the first of the two alone.
+    // A pair of mutual neighbours is listed only by its first member.
     const auto listed_there = [&](int64_t i, int64_t j) {
       return j < i && std::ranges::find(near[static_cast<size_t>(j)], i) != near[static_cast<size_t>(j)].end();
     };
@@ -225,7 +225,7 @@ class Reduction {
     return lengths;
   }
 
-  // Without those that are gone.
+  // Removes merged ones.
   void Compact() {
     const auto stride = static_cast<size_t>(cloud_.sh_stride());
     size_t to = 0;
@@ -249,7 +249,7 @@ class Reduction {
     cloud_.Resize(static_cast<int64_t>(to), cloud_.sh_degree);
   }
 
-  // Moments of merged ones as the cloud stores Gaussians.
+  // Converts moments of merged Gaussians to stored form.
   void Store() {
     ParallelFor(0, size(), kMergeGrain, [&](int64_t first, int64_t last) {
       for (auto i = static_cast<size_t>(first); i < static_cast<size_t>(last); ++i) {
@@ -261,8 +261,8 @@ class Reduction {
         const std::array<double, 4> quat = QuaternionFromRotation(ellipsoid.axes);
         for (size_t k = 0; k < 3; ++k) {
           cloud_.means[3 * i + k] = static_cast<float>(moments_[i].mean[k]);
-          // Of two that are farther apart nothing is left to see.
-          cloud_.log_scales[3 * i + k] = std::min(static_cast<float>(std::log(lengths[k])), kLargestLogScale);
+          // Merging two that are farther apart leaves nothing visible.
+          cloud_.log_scales[3 * i + k] = std::min(static_cast<float>(std::log(lengths[k])), kMaxLogScale);
         }
         for (size_t k = 0; k < 4; ++k) cloud_.quats[4 * i + k] = static_cast<float>(quat[k]);
         cloud_.opacity_logits[i] = LogitFromOpacity(static_cast<float>(std::min(opacity, 1.0)));
@@ -274,12 +274,12 @@ class Reduction {
   int64_t target_;
   std::vector<Merged> moments_;
   std::vector<char> changed_, gone_;
-  std::vector<double> logs_;  // ln|Σ| of each, in this round
+  std::vector<double> logs_;  // ln|Σ| of each in this round
 };
 
 }  // namespace
 
-GaussianCloud Coarser(const CloudView& cloud, int64_t target) {
+GaussianCloud CoarsenCloud(const CloudView& cloud, int64_t target) {
   return Reduction(cloud, std::max<int64_t>(1, target)).Run();
 }
 

@@ -58,7 +58,7 @@ TEST(CoarserCloud, APairKeepsItsMoments) {
     for (float& logit : two.opacity_logits) logit -= 4;  // there is room for both in one opacity
     const Plain a = PlainOf(two, 0), b = PlainOf(two, 1);
     const double w1 = a.opacity * a.surface, w2 = b.opacity * b.surface, p = w1 / (w1 + w2);
-    const GaussianCloud one = Coarser(two, 1);
+    const GaussianCloud one = CoarsenCloud(two, 1);
     ASSERT_EQ(one.size(), 1);
     const Plain c = PlainOf(one, 0);
     double size = 0;
@@ -86,7 +86,7 @@ TEST(CoarserCloud, OpaqueNeighboursGrowInsteadOfLeavingGaps) {
   two.quats = {1, 0, 0, 0, 1, 0, 0, 0};
   two.opacity_logits = {20, 20};
   two.sh.assign(6, 0.5f);
-  const GaussianCloud one = Coarser(two, 1);
+  const GaussianCloud one = CoarsenCloud(two, 1);
   const double middle = one.log_scales[0] + one.log_scales[1] + one.log_scales[2];
   EXPECT_NEAR(middle, 0.5 * std::log(1.25) + 3 * std::log(1.2), 1e-5);  // variances 1, 1, 1 + 1/4; a fifth longer
   EXPECT_GT(one.opacity_logits[0], 13);
@@ -95,7 +95,7 @@ TEST(CoarserCloud, OpaqueNeighboursGrowInsteadOfLeavingGaps) {
 TEST(CoarserCloud, ThoseThatStayKeepTheirBitsAndTheirOrder) {
   const GaussianCloud cloud = RandomCloud(500, 1, 3);
   for (const int64_t target : {500, 499, 400, 17, 1}) {
-    const GaussianCloud coarser = Coarser(cloud, target);
+    const GaussianCloud coarser = CoarsenCloud(cloud, target);
     ASSERT_EQ(coarser.size(), target);
     EXPECT_EQ(CountUnusable(coarser), 0);
     int64_t same = 0, at = 0;
@@ -118,9 +118,9 @@ TEST(CoarserCloud, ThoseThatStayKeepTheirBitsAndTheirOrder) {
 TEST(CoarserCloud, SameBitsForAnyNumberOfThreads) {
   const GaussianCloud cloud = RandomCloud(5000, 2, 4);
   SetThreadCount(1);
-  const GaussianCloud one = Coarser(cloud, 1250);
+  const GaussianCloud one = CoarsenCloud(cloud, 1250);
   SetThreadCount(5);
-  const GaussianCloud five = Coarser(cloud, 1250);
+  const GaussianCloud five = CoarsenCloud(cloud, 1250);
   SetThreadCount(0);
   ExpectSameCloud(one, five);
 }
@@ -137,7 +137,7 @@ TEST(CoarserCloud, FlatFaintAndCoincidentOnes) {
   for (size_t i = 4 * 240; i < 4 * 243; ++i) cloud.quats[i] = 0;
   ASSERT_EQ(CountUnusable(cloud), 0);
   for (const int64_t target : {100, 3, 1}) {
-    const GaussianCloud coarser = Coarser(cloud, target);
+    const GaussianCloud coarser = CoarsenCloud(cloud, target);
     EXPECT_EQ(coarser.size(), target);
     EXPECT_EQ(CountUnusable(coarser), 0) << target;
   }
@@ -177,7 +177,7 @@ TEST(CoarserCloud, LooksLikeTheFinestFromFarAway) {
   // dB against the finest as it is drawn at that size, which is thicker than it is, and against its average.
   constexpr struct { double drawn, averaged, over_pruned; } kLeast[] = {{30, 31.5, 8}, {25.5, 27, 8}, {21.5, 24, 6}};
   for (int number = 1; number <= 3; ++number) {
-    level = Coarser(level, (level.size() + 3) / 4);
+    level = CoarsenCloud(level, (level.size() + 3) / 4);
     GaussianCloud pruned = *finest;
     KeepMostImportant(pruned, level.size());
     const auto picture = [&](const GaussianCloud& cloud, int side) {

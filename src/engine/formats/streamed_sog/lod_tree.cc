@@ -13,7 +13,7 @@ namespace anchorsplat {
 namespace {
 
 constexpr int64_t kMostInLeaf = 1 << 16;
-constexpr int64_t kLongLeaf = 1 << 12;  // a stray Gaussian far out shall not be a chunk of its own
+constexpr int64_t kLongLeaf = 1 << 12;  // so that a distant Gaussian does not get its own chunk
 constexpr int64_t kGatherGrain = 1 << 12;
 
 class TreeBuilder {
@@ -71,7 +71,7 @@ class TreeBuilder {
   }
 
   void SortLeaf(int64_t begin, int64_t end) {
-    // The order in which the median left them is the library's; that of the cloud decides where two are in one cell.
+    // std::nth_element leaves an unspecified order; ties of cells are resolved by the cloud's.
     std::sort(tree_.rows.begin() + begin, tree_.rows.begin() + end);
     const Buffer<uint32_t> own(tree_.rows.begin() + begin, tree_.rows.begin() + end);
     Buffer<float> means(3 * own.size());
@@ -100,7 +100,7 @@ LodTree BuildLodTree(const CloudView& cloud, const LodOptions& options) {
 }
 
 std::vector<int64_t> LeavesOf(const LodTree& tree) {
-  std::vector<int64_t> leaves;  // nodes are in the order of their first rows, a node before those below it
+  std::vector<int64_t> leaves;  // nodes are sorted by first row, parents before children
   for (size_t k = 0; k < tree.nodes.size(); ++k) {
     if (tree.nodes[k].is_leaf()) leaves.push_back(static_cast<int64_t>(k));
   }

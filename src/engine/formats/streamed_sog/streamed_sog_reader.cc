@@ -25,13 +25,13 @@ namespace {
 constexpr uint64_t kMaxIndex = uint64_t{256} << 20;
 constexpr int kMostLevels = 256;
 
-// Gaussians of a chunk that belong to a leaf.
+// A range of a chunk's Gaussians that belongs to a leaf.
 struct Run {
   size_t file = 0;
   int64_t offset = 0, count = 0;
 };
 
-// A chunk lies in the folder of the index or below it.
+// Chunks are in the folder of the index or below.
 bool StaysBelow(const std::string& name) {
   if (name.empty() || name.find_first_of("\\:") != name.npos || name.find('\0') != name.npos) return false;
   const std::filesystem::path path = name;
@@ -79,7 +79,7 @@ Result<Index> ReadIndex(const InputFile& file) {
   return index;
 }
 
-// The level of a leaf that stands for `level`; nothing where the leaf is empty.
+// The level of a leaf to use for `level`; none if the leaf is empty.
 std::optional<JsonValue> LevelOf(const JsonValue& lods, int level, int levels) {
   for (int finer = level; finer >= 0; --finer) {
     if (std::optional<JsonValue> found = lods.Find(Cat(finer).c_str())) return found;
@@ -90,7 +90,7 @@ std::optional<JsonValue> LevelOf(const JsonValue& lods, int level, int levels) {
   return std::nullopt;
 }
 
-// Of all leaves below a node, in their order. JsonFile bounds the depth.
+// Collects the leaves below a node in order. JsonFile limits the depth.
 Status CollectRuns(const JsonValue& node, const Index& index, int level, std::vector<Run>& runs) {
   if (const std::optional<JsonValue> lods = node.Find("lods")) {
     if (!lods->raw().is_object()) return lods->Complain("expected the levels of a leaf");
@@ -114,7 +114,7 @@ Status CollectRuns(const JsonValue& node, const Index& index, int level, std::ve
   return {};
 }
 
-// No Gaussian belongs to two leaves: a small file could ask for one chunk a million times.
+// Ranges must not overlap: a small file could reference a chunk a million times.
 Status CheckApart(const InputFile& file, const Index& index, std::vector<Run> runs) {
   std::ranges::sort(
       runs, [](const Run& a, const Run& b) { return std::pair(a.file, a.offset) < std::pair(b.file, b.offset); });
@@ -150,7 +150,7 @@ void AddComments(const GaussianCloud& from, GaussianCloud& to) {
   if (!to.render_mode) to.render_mode = from.render_mode;
 }
 
-// The bytes of a chunk, 0 where it cannot be opened, which reading then says.
+// Bytes of a chunk; 0 if it cannot be opened, which reading reports.
 uint64_t ChunkSize(const InputFile& file, const std::string& name) {
   const Result<InputFile> chunk = file.OpenBeside(name);
   return chunk.ok() ? SogSize(*chunk) : 0;
@@ -169,15 +169,15 @@ Result<GaussianCloud> ReadStreamedSog(const InputFile& file, const ReadLimits& l
   ANCHORSPLAT_RETURN_IF_ERROR(CollectRuns(tree, index, limits.lod_level, runs));
   ANCHORSPLAT_RETURN_IF_ERROR(CheckApart(file, index, runs));
   uint64_t total = 0, compressed = 0;
-  std::map<size_t, std::vector<std::pair<Run, int64_t>>> by_file;  // with the places of runs in the cloud
+  std::map<size_t, std::vector<std::pair<Run, int64_t>>> by_file;  // with each run's position in the cloud
   for (const Run& run : runs) {
     by_file[run.file].emplace_back(run, static_cast<int64_t>(total));
     total += static_cast<uint64_t>(run.count);
   }
   ANCHORSPLAT_RETURN_IF_ERROR(CheckCount(file.name(), total, limits));
   for (const auto& [chunk, unused] : by_file) compressed += ChunkSize(file, index.files[chunk]);
-  // Means take four bytes at least; what is larger has to be paid for.
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(file.name(), compressed, total * sizeof(float)));
+  // Means take at least four bytes each, which bounds the claimed size.
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckCompressionRatio(file.name(), compressed, total * sizeof(float)));
 
   constexpr std::array<std::string_view, 9> kKnown = {"version",   "asset", "lodLevels",   "counts", "count",
                                                       "filenames", "tree",  "environment", "extras"};
@@ -208,7 +208,7 @@ Result<GaussianCloud> ReadStreamedSog(const InputFile& file, const ReadLimits& l
     ANCHORSPLAT_RETURN_IF_ERROR(Append(cloud, gaussians));
     AddComments(gaussians, cloud);
   }
-  // Of all chunks, which have none of their own.
+  // For all chunks, which have none of their own.
   ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<std::string> said, CommentsOfAsset(index.json.root()));
   cloud.origin = TakeOrigin(said);
   return cloud;

@@ -8,8 +8,8 @@
 
 namespace anchorsplat {
 
-// Reads PlayCanvas's streamed SOG, version 1 or the one before there were numbers: a scene at several levels of detail,
-// in chunks. `file` is its lod-meta.json:
+// Reads PlayCanvas's streamed SOG, version 1 or the unnumbered one before: a scene in chunks with several levels of
+// detail. `file` is its lod-meta.json:
 //
 //   lodLevels    how many levels there are; 0 is the finest
 //   counts       Gaussians of each
@@ -18,18 +18,18 @@ namespace anchorsplat {
 //                as text, the Gaussians `offset` to `offset` + `count` of the chunk `file`
 //   environment  a SOG that is there at every level, or null
 //
-// The cloud is level `limits.lod_level`, leaf by leaf, then the environment. Of a leaf without that level it is the
-// nearest finer one, or else the nearest coarser one.
+// The result is level `limits.lod_level`, leaf by leaf, then the environment. A leaf without that level uses the
+// nearest finer one, else the nearest coarser one.
 //
-// Errors (kBadFile): JSON that is none, members missing or of the wrong kind, a level that is not there, names that
-// lead out of the folder, ranges that overlap or leave their chunk, more than `limits.max_gaussians`, sizes that only a
-// decompression bomb has, bytes in memory, beside which there are no chunks; those of ReadSog. kNotFound: a chunk.
+// Errors (kBadFile): invalid JSON; missing members or wrong types; no such level; names outside the folder; ranges that
+// overlap or exceed their chunk; more than `limits.max_gaussians`; a decompression bomb; bytes in memory, which have no
+// chunks; those of ReadSog. kNotFound: a chunk.
 Result<GaussianCloud> ReadStreamedSog(const InputFile& file, const ReadLimits& limits = {});
 
-// Bytes of the file and of all chunks.
+// Bytes of the file and all chunks.
 uint64_t StreamedSogSize(const InputFile& file);
 
-// Version, levels, chunks, who wrote it.
+// Version, levels, chunks, generator.
 Result<FormatFacts> DescribeStreamedSog(const InputFile& file);
 
 }  // namespace anchorsplat

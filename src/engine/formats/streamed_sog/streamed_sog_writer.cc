@@ -39,9 +39,9 @@ using OrderedJson = nlohmann::ordered_json;
 
 constexpr std::string_view kIndexName = "lod-meta.json";
 
-// A level of a leaf: where it lies.
+// Location of a leaf's level.
 struct LeafRange {
-  int64_t chunk = 0;  // of the level
+  int64_t chunk = 0;  // within the level
   int64_t offset = 0;
   int64_t count = 0;
 };
@@ -60,7 +60,7 @@ struct Box {
   }
 };
 
-// Of the ellipsoids of one standard deviation, as other writers of the format have it.
+// Bounds of the one-standard-deviation ellipsoids, as in other writers.
 Box BoxOf(const CloudView& cloud) {
   Box box;
   for (int64_t i = 0; i < cloud.size(); ++i) {
@@ -81,7 +81,7 @@ Box BoxOf(const CloudView& cloud) {
   return box;
 }
 
-// With 7 significant digits, as the format asks, and never inside of what it bounds.
+// Rounds outwards to 7 significant digits, as the format requires.
 double RoundedAway(double x, double sign) {
   if (x == 0) return 0;
   char text[32];
@@ -104,21 +104,21 @@ OrderedJson BoundJson(const Box& box) {
   return {{"min", min}, {"max", max}};
 }
 
-// All levels of a leaf, the finest first; fewer where one has a single Gaussian already.
+// All levels of a leaf, finest first; fewer if one is down to a single Gaussian.
 std::vector<GaussianCloud> LevelsOf(GaussianCloud finest, const LodOptions& options) {
   std::vector<GaussianCloud> levels;
   levels.push_back(std::move(finest));
   for (int level = 1; level < options.levels; ++level) {
     const auto target = static_cast<int64_t>(std::ceil(static_cast<double>(levels.back().size()) * options.ratio));
-    levels.push_back(Coarser(levels.back(), target));
+    levels.push_back(CoarsenCloud(levels.back(), target));
   }
   return levels;
 }
 
-// Chunks of the levels while they are filled, leaf after leaf.
+// Chunks of the levels, filled leaf by leaf.
 class ChunkWriter {
  public:
-  // The folders go to `folder`, or into options.memory under that name.
+  // Folders are created in `folder`, or in options.memory under that name.
   ChunkWriter(fs::path folder, const CloudWriteOptions& options)
       : folder_(std::move(folder)), options_(options), levels_(static_cast<size_t>(options.lod.levels)) {}
 
@@ -143,7 +143,7 @@ class ChunkWriter {
 
   int64_t count(size_t level) const { return levels_[level].count; }
 
-  // "0_0", "0_1", …, "1_0": all chunks, by level.
+  // "0_0", "0_1", …, "1_0": all chunks by level.
   std::vector<std::string> Names() const {
     std::vector<std::string> names;
     for (size_t level = 0; level < levels_.size(); ++level) {
@@ -151,7 +151,7 @@ class ChunkWriter {
     }
     return names;
   }
-  // The place of a chunk in Names().
+  // Index of a chunk in Names().
   int64_t IndexOf(size_t level, int64_t chunk) const {
     for (size_t finer = 0; finer < level; ++finer) chunk += levels_[finer].chunks;
     return chunk;
@@ -160,8 +160,8 @@ class ChunkWriter {
  private:
   struct Level {
     GaussianCloud open;
-    int64_t chunks = 0;  // written
-    int64_t count = 0;   // Gaussians, also those in `open`
+    int64_t chunks = 0;  // chunks written
+    int64_t count = 0;   // Gaussians, including those in `open`
   };
 
   Status Close(size_t level) {
@@ -187,13 +187,13 @@ class ChunkWriter {
   std::vector<Level> levels_;
 };
 
-// What the index says of a leaf.
+// JSON of a leaf.
 struct LeafFacts {
   Box box;
   std::vector<LeafRange> levels;
 };
 
-// Leaves side by side, as many as there are threads; written in their order.
+// Processes as many leaves in parallel as there are threads; written in order.
 Result<std::vector<LeafFacts>> WriteLeaves(const CloudView& cloud, const LodTree& tree,
                                            const std::vector<int64_t>& leaves, const LodOptions& options,
                                            ChunkWriter& chunks) {
@@ -221,7 +221,7 @@ Result<std::vector<LeafFacts>> WriteLeaves(const CloudView& cloud, const LodTree
   return facts;
 }
 
-// The tree below a node, and its box.
+// JSON of the tree below a node, and its bounds.
 OrderedJson TreeJson(const LodTree& tree, int64_t at, const std::vector<int64_t>& leaves,
                      const std::vector<LeafFacts>& facts, const ChunkWriter& chunks, Box& box) {
   const LodTree::Node& node = tree.nodes[static_cast<size_t>(at)];
@@ -248,11 +248,11 @@ OrderedJson TreeJson(const LodTree& tree, int64_t at, const std::vector<int64_t>
   return json;
 }
 
-// The chunk folders that the scene under this name has: only plain names, only ours to remove.
+// Chunk folders of the existing scene: only plain names, as only ours may be removed.
 std::vector<fs::path> OldChunks(const fs::path& index) {
   std::vector<fs::path> folders;
   if (!IsFile(index)) return folders;
-  RecordOwnFile(index);  // which is replaced, not read for what is written
+  RecordOwnFile(index);  // it is replaced, not an input
   const Result<JsonFile> json = JsonFile::Read(index);
   const std::optional<JsonValue> names = json.ok() ? json->root().Find("filenames") : std::nullopt;
   if (!names || !names->raw().is_array()) return folders;
@@ -267,7 +267,7 @@ std::vector<fs::path> OldChunks(const fs::path& index) {
   return folders;
 }
 
-// Only what a SOG consists of; a folder with something else in it stays.
+// Removes only the files of a SOG; a folder with anything else stays.
 void RemoveChunk(const fs::path& folder) {
   std::error_code ignored;
   if (fs::symlink_status(folder, ignored).type() != fs::file_type::directory) return;
@@ -276,7 +276,7 @@ void RemoveChunk(const fs::path& folder) {
   fs::remove(folder, ignored);
 }
 
-// The names with what makes none of them one that is there: "0_0", or "0_0-2" for all.
+// Adds a suffix so that no name exists: "0_0", or "0_0-2" for all.
 std::vector<std::string> FreeNames(const fs::path& folder, const std::vector<std::string>& names) {
   for (int number = 1;; ++number) {
     std::vector<std::string> free;
@@ -289,7 +289,7 @@ std::vector<std::string> FreeNames(const fs::path& folder, const std::vector<std
   }
 }
 
-// A folder that was made for the output and goes again unless something came of it.
+// A folder created for the output, removed again if unused.
 class MadeFolder {
  public:
   static Result<MadeFolder> Make(const fs::path& folder) {
@@ -306,7 +306,7 @@ class MadeFolder {
   MadeFolder& operator=(MadeFolder&&) = delete;
   ~MadeFolder() {
     std::error_code ignored;
-    if (!folder_.empty()) fs::remove(folder_, ignored);  // only where it is empty
+    if (!folder_.empty()) fs::remove(folder_, ignored);  // only if empty
   }
 
  private:

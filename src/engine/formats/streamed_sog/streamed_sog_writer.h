@@ -10,22 +10,21 @@
 
 namespace anchorsplat {
 
-// Writes PlayCanvas's streamed SOG, version 1 (layout: streamed_sog_reader.h): `path`, which must be called
-// lod-meta.json, and beside it a folder LEVEL_CHUNK for every chunk with an unbundled SOG in it. Level 0 is the cloud;
-// each further one is made of the one before by merging (coarser_cloud.h), leaf by leaf of a tree (lod_tree.h), so that
-// memory beside the cloud is bounded by leaves and chunks, not by the cloud. The folder of `path` is made where there
-// is none. Chunks have their names before lod-meta.json gets its own, and none of those that an older lod-meta.json
-// names is replaced: whoever reads sees the old scene or the new one. The old one's chunks are then removed.
-// Lost: Gaussians that nobody draws (IsUsable), which a warning counts; otherwise as SOG.
-// Errors: kExists, kIo, kBadArgument (arrays that disagree, nothing to draw, options out of range, another name);
-// kInterrupted where the run is asked to stop: then nothing has changed.
+// Writes PlayCanvas's streamed SOG, version 1 (layout: streamed_sog_reader.h): `path`, which must be named
+// lod-meta.json, and beside it a folder LEVEL_CHUNK with an unbundled SOG per chunk. Level 0 is the cloud; each further
+// level merges the previous one (coarser_cloud.h) per leaf of a tree (lod_tree.h), so that extra memory is bounded by
+// leaves and chunks. Creates the folder of `path` if needed. Chunks are published before lod-meta.json, and chunks of
+// an older lod-meta.json are not replaced, so readers see the old or the new scene; the old chunks are removed
+// afterwards. Lost: unusable Gaussians (IsUsable), counted in a warning; rounding as in SOG. Errors: kExists, kIo,
+// kBadArgument (inconsistent arrays, nothing to draw, options out of range, another name); kInterrupted: the run was
+// stopped, and nothing has changed.
 Status WriteStreamedSog(const std::filesystem::path& path, const CloudView& cloud,
                         const CloudWriteOptions& options = {});
 
-// Rows of the cloud in the order in which level 0 has them; without those that are dropped.
+// Rows of the cloud in the order of level 0, without dropped ones.
 Buffer<uint32_t> StreamedSogRows(const CloudView& cloud, const CloudWriteOptions& options);
 
-// Of all levels with the default options.
+// Estimated for all levels with default options.
 uint64_t EstimatedStreamedSogSize(int64_t count, int sh_degree);
 
 }  // namespace anchorsplat

@@ -16,7 +16,7 @@ namespace {
 
 constexpr int64_t kRowsPerTask = 1 << 12;
 constexpr int64_t kTasksAtOnce = 32;
-constexpr uint64_t kBytesPerNumber = 13;  // "-0.123456789" and what ends it
+constexpr uint64_t kBytesPerNumber = 13;  // "-0.123456789" and a separator
 
 std::string Names(int degree) {
   std::string line = "x,y,z";

@@ -17,7 +17,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "arrays are written as they lie in memory");
 
-// What comes before the values in a .npy file of version 1.0: a Python dictionary, filled up to a multiple of 64 bytes.
+// Header of a .npy file of version 1.0: a Python dictionary, padded to a multiple of 64 bytes.
 std::string NpyHeader(const std::string& shape, const char* type = "<f4") {
   std::string text = Cat("{'descr': '", type, "', 'fortran_order': False, 'shape': (", shape, "), }");
   constexpr size_t kPreamble = 10;
@@ -46,7 +46,7 @@ std::array<Array, 5> Arrays(const CloudView& cloud, int64_t n, int degree) {
            {"sh.npy", Cat(n, ", ", coefficients, ", 3"), 3 * coefficients * count, cloud.sh.data()}}};
 }
 
-// The means as doubles in the world.
+// World positions as doubles.
 Status AddWorld(ZipWriter& archive, const Array& array, const CloudView& cloud) {
   Buffer<double> world(cloud.means.size());
   for (size_t k = 0; k < world.size(); ++k) world[k] = cloud.origin[k % 3] + double{cloud.means[k]};
@@ -58,7 +58,7 @@ Status AddWorld(ZipWriter& archive, const Array& array, const CloudView& cloud) 
 
 }  // namespace
 
-// Below 4 GiB, where no member needs the 64-bit extensions.
+// Valid below 4 GiB, where no member needs zip64.
 uint64_t PredictedNpzSize(int64_t count, int sh_degree) {
   uint64_t size = 22;
   for (const Array& array : Arrays({}, count, sh_degree)) {

@@ -9,18 +9,18 @@
 
 namespace anchorsplat {
 
-// For notebooks and spreadsheets. Both keep every stored value as it is (log-scales, logits, wxyz), in the order of the
-// cloud. Errors: kExists, kIo, kBadArgument (arrays that disagree, no Gaussians).
+// Writers for notebooks and spreadsheets. Both keep all stored values (log-scales, logits, wxyz) in the order of the
+// cloud. Errors: kExists, kIo, kBadArgument (inconsistent arrays, no Gaussians).
 
-// Text: a line of names as in an INRIA PLY (x,y,z,f_dc_0 … f_rest_* channel-major …,opacity,scale_0 …,rot_0 …), then a
-// line per Gaussian with the shortest decimal numbers that read back as the same floats.
+// CSV: a header with the names of an INRIA PLY (x,y,z,f_dc_0 … f_rest_* channel-major …,opacity,scale_0 …,rot_0 …),
+// then a line per Gaussian with the shortest decimals that parse to the same floats.
 Status WriteCsv(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options = {});
 
-// Of numbers as fits have them, 9 digits each: 0 and round ones take less, very small ones more.
+// For typical numbers of 9 digits; 0 and round ones are shorter, very small ones longer.
 uint64_t EstimatedCsvSize(int64_t count, int sh_degree);
 
-// NumPy's archive of float32 arrays: means [N,3], log_scales [N,3], quats [N,4] wxyz, opacity_logits [N],
-// sh [N,(degree+1)²,3]. numpy.load(path)["means"].
+// NumPy archive of float32 arrays: means [N,3], log_scales [N,3], quats [N,4] wxyz, opacity_logits [N], sh
+// [N,(degree+1)²,3]. Read with numpy.load(path)["means"].
 Status WriteNpz(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options = {});
 uint64_t PredictedNpzSize(int64_t count, int sh_degree);
 

@@ -14,12 +14,12 @@ struct sigaction handler_before = {};
 
 void LeaveLibrary(int signal) {
   if (abort_return != nullptr) siglongjmp(*abort_return, 1);
-  // Of a thread that is not guarded: as it would have been without us, as soon as this returns.
+  // An unguarded thread: abort() proceeds as usual when this returns.
   sigaction(signal, &handler_before, nullptr);
   std::raise(signal);
 }
 
-// The handler is there for as long as any thread is guarded.
+// The handler is installed while any thread is guarded.
 class AbortHandler {
  public:
   void Add() {

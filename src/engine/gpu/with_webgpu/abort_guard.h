@@ -4,9 +4,9 @@
 
 namespace anchorsplat {
 
-// Calls `library_call` and returns true; false if it ended in abort(), which is what wgpu-native does where a device is
-// lost while work is handed over. Its locks are then held for ever: nothing more of the library may be called. What the
-// call has to destroy must be outside of it. Aborts of other threads end the program as ever.
+// Calls `library_call`; returns false if it ended in abort(), as wgpu-native does if a device is lost during
+// submission. The library's locks are then held forever, so it must never be called again. Objects that need
+// destruction must live outside of the call. Aborts of other threads still end the program.
 bool SurvivesAbort(const std::function<void()>& library_call);
 
 }  // namespace anchorsplat

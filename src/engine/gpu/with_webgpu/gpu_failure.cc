@@ -6,9 +6,9 @@
 
 namespace anchorsplat {
 
-bool SaysLost(const std::string& message) { return message.find("device is lost") != std::string::npos; }
+bool IsDeviceLost(const std::string& message) { return message.find("device is lost") != std::string::npos; }
 
-std::string ReasonIn(const std::string& message) {
+std::string ReasonOf(const std::string& message) {
   std::string reason;
   size_t at = 0;
   while (at < message.size()) {
@@ -24,7 +24,7 @@ std::string ReasonIn(const std::string& message) {
 void GpuFailure::Set(const std::string& sentence) {
   const std::lock_guard lock(mutex_);
   if (happened_) return;
-  sentence_ = SaysLost(sentence) ? kGpuLost : sentence;
+  sentence_ = IsDeviceLost(sentence) ? kGpuLost : sentence;
   happened_.store(true, std::memory_order_release);
 }
 

@@ -10,14 +10,14 @@ namespace anchorsplat {
 
 inline constexpr const char* kGpuLost = "the device was lost while it worked";
 
-// Whether a message of the library is about that; wgpu-native says so in every call that finds out.
-bool SaysLost(const std::string& message);
+// Whether a library message reports a lost device; wgpu-native does so in every affected call.
+bool IsDeviceLost(const std::string& message);
 
-// What a message of the library comes to: its last line that says something. "Validation Error", "Caused by:" and the
-// name of the function stand above.
-std::string ReasonIn(const std::string& message);
+// The reason in a library message: its last line with content, below "Validation Error", "Caused by:" and the function
+// name.
+std::string ReasonOf(const std::string& message);
 
-// The first failure of a device, told by whoever notices: calls of ours, or the library from whichever thread.
+// The first failure of a device, from our calls or from library callbacks on any thread.
 class GpuFailure {
  public:
   void Set(const std::string& sentence);

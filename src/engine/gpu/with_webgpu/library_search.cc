@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// In the wheel, and as a system would call it.
+// Names in the wheel and as a system library.
 constexpr const char* kLibraryNames[] = {"libwgpu_native-release.so", "libwgpu_native.so"};
 constexpr const char* kSystemLibrary = "libwgpu_native.so";
 
@@ -43,7 +43,7 @@ class Candidates {
     }
   }
 
-  // Of a Python whose prefix this is, as the folders of packages are called everywhere.
+  // Package folders of the Python with this prefix.
   void AddPrefix(const fs::path& prefix) {
     if (prefix.empty()) return;
     for (const fs::path& library : EntriesOf(prefix / "lib")) {
@@ -61,7 +61,7 @@ class Candidates {
   std::vector<std::string> Take() { return std::move(found_); }
 
  private:
-  // Sorted; none of a folder that cannot be read.
+  // Sorted entries; none if the folder cannot be read.
   static std::vector<fs::path> EntriesOf(const fs::path& folder) {
     std::vector<fs::path> entries;
     std::error_code failed;
@@ -100,7 +100,7 @@ std::vector<std::string> LibraryCandidates(const LibrarySearch& search) {
   candidates.AddAround(search.module_folder);
   if (!search.module_folder.empty()) candidates.AddFolder(search.module_folder.parent_path() / "wgpu" / "resources");
   candidates.AddAround(search.program_folder);
-  if (search.program_folder.filename() == "_bin") {  // of the Python package
+  if (search.program_folder.filename() == "_bin") {  // in the Python package
     candidates.AddFolder(search.program_folder.parent_path().parent_path() / "wgpu" / "resources");
   }
   candidates.AddPrefix(search.virtual_environment);

@@ -13,12 +13,12 @@ namespace anchorsplat {
 
 namespace {
 
-// Never given back: work may still be under way when the program ends.
+// Never destroyed: work may still run when the program ends.
 struct OpenDevices {
   std::mutex mutex;
   std::map<int, std::shared_ptr<WebGpuDevice>> by_adapter, unchecked_by_adapter;
   std::vector<std::shared_ptr<WebGpuDevice>> failed;  // the library may still call back about them
-  std::vector<GpuAdapter> adapters;                   // as they were found; empty: not looked yet
+  std::vector<GpuAdapter> adapters;                   // as found; empty: not searched yet
 };
 
 OpenDevices& Devices() {
@@ -68,7 +68,7 @@ Result<std::shared_ptr<GpuDevice>> Open(const DeviceChoice& choice, bool uncheck
   std::shared_ptr<WebGpuDevice>& kept = by_adapter[static_cast<int>(index)];
   if (kept && !kept->failed()) return std::shared_ptr<GpuDevice>(kept);
   if (kept) devices.failed.push_back(std::move(kept));
-  // An adapter gives one device (Dawn), so it is looked for anew.
+  // In Dawn, an adapter gives only one device, so find it again.
   if (found.empty()) found = instance.Adapters();
   if (index >= found.size()) return Error{ErrorCode::kNotFound, "the GPU is gone"};
   ANCHORSPLAT_ASSIGN_OR_RETURN(std::shared_ptr<WebGpuDevice> opened,

@@ -26,7 +26,7 @@ std::string LineOf(std::string_view text, size_t number) {
   return {};
 }
 
-// The 3 of ":3:5"; 0 where there is no such place.
+// The line number 3 in ":3:5"; 0 if there is none.
 size_t LineNumberIn(std::string_view message) {
   for (size_t at = message.find(':'); at != std::string_view::npos; at = message.find(':', at + 1)) {
     size_t number = 0;
@@ -38,14 +38,14 @@ size_t LineNumberIn(std::string_view message) {
   return 0;
 }
 
-// What stands behind the last "error:", or else on the last line that says something.
+// The text after the last "error:", else the last line with content.
 std::string WordsIn(std::string_view message) {
   constexpr std::string_view kMark = "error:";
   if (const size_t mark = message.rfind(kMark); mark != std::string_view::npos) {
     message.remove_prefix(mark + kMark.size());
     return Trimmed(message.substr(0, message.find('\n')));
   }
-  return ReasonIn(std::string(message));
+  return ReasonOf(std::string(message));
 }
 
 }  // namespace

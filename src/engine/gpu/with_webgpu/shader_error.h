@@ -5,8 +5,8 @@
 
 namespace anchorsplat {
 
-// What a library says of WGSL that it does not compile, as one sentence: its first words on the error, and the line of
-// `text` that it points to, where it names one.
+// A WGSL compile error as one sentence: the library's first words on it, and the line of `text` that it points to, if
+// any.
 std::string ShaderError(const std::string& message, std::string_view text);
 
 }  // namespace anchorsplat

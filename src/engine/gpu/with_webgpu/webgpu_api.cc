@@ -13,8 +13,8 @@ namespace anchorsplat {
 
 namespace {
 
-// Whether the file ends before what its header says is loaded of it. The system's loader maps that without looking,
-// and the process dies of the first page that is not there.
+// Whether the file is shorter than the segments in its header. The system's loader maps it unchecked, and the process
+// would crash on the first missing page.
 bool IsCutShort(const std::string& path) {
   std::ifstream file(path, std::ios::binary | std::ios::ate);
   const auto size = file ? static_cast<uint64_t>(file.tellg()) : 0;

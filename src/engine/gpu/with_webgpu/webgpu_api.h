@@ -10,36 +10,37 @@
 
 namespace anchorsplat {
 
-// The functions of the standard header that are called, without their prefix "wgpu".
-// As it would move these at every call:
-// clang-format off
-#define ANCHORSPLAT_WEBGPU_FUNCTIONS(X) \
-  X(CreateInstance) X(InstanceProcessEvents) X(InstanceRequestAdapter) X(AdapterGetInfo) X(AdapterInfoFreeMembers) \
-  X(AdapterGetLimits) X(AdapterHasFeature) X(AdapterRequestDevice) X(AdapterRelease) X(DeviceCreateBindGroup) \
-  X(DeviceCreateBuffer) X(DeviceCreateCommandEncoder) X(DeviceCreateComputePipeline) X(DeviceCreateShaderModule) \
-  X(DeviceGetQueue) X(DevicePopErrorScope) X(DevicePushErrorScope) X(QueueOnSubmittedWorkDone) X(QueueSubmit) \
-  X(QueueWriteBuffer) X(BufferDestroy) X(BufferGetConstMappedRange) X(BufferMapAsync) X(BufferRelease) \
-  X(BufferUnmap) X(CommandEncoderBeginComputePass) X(CommandEncoderClearBuffer) X(CommandEncoderCopyBufferToBuffer) \
-  X(CommandEncoderFinish) X(CommandEncoderRelease) X(CommandBufferRelease) X(ComputePassEncoderDispatchWorkgroups) \
-  X(ComputePassEncoderEnd) X(ComputePassEncoderRelease) X(ComputePassEncoderSetBindGroup) \
-  X(ComputePassEncoderSetPipeline) X(ComputePipelineGetBindGroupLayout) X(BindGroupRelease) X(ShaderModuleRelease)
+// Functions of the standard header that we call, without the prefix "wgpu".
+#define ANCHORSPLAT_WEBGPU_FUNCTIONS(X)                                                                                \
+  X(CreateInstance)                                                                                                    \
+  X(InstanceProcessEvents) X(InstanceRequestAdapter) X(AdapterGetInfo) X(AdapterInfoFreeMembers) X(AdapterGetLimits)   \
+      X(AdapterHasFeature) X(AdapterRequestDevice) X(AdapterRelease) X(DeviceCreateBindGroup) X(DeviceCreateBuffer)    \
+          X(DeviceCreateCommandEncoder) X(DeviceCreateComputePipeline) X(DeviceCreateShaderModule) X(DeviceGetQueue)   \
+              X(DevicePopErrorScope) X(DevicePushErrorScope) X(QueueOnSubmittedWorkDone) X(QueueSubmit)                \
+                  X(QueueWriteBuffer) X(BufferDestroy) X(BufferGetConstMappedRange) X(BufferMapAsync) X(BufferRelease) \
+                      X(BufferUnmap) X(CommandEncoderBeginComputePass) X(CommandEncoderClearBuffer)                    \
+                          X(CommandEncoderCopyBufferToBuffer) X(CommandEncoderFinish) X(CommandEncoderRelease)         \
+                              X(CommandBufferRelease) X(ComputePassEncoderDispatchWorkgroups) X(ComputePassEncoderEnd) \
+                                  X(ComputePassEncoderRelease) X(ComputePassEncoderSetBindGroup)                       \
+                                      X(ComputePassEncoderSetPipeline) X(ComputePipelineGetBindGroupLayout)            \
+                                          X(BindGroupRelease) X(ShaderModuleRelease)
 // clang-format on
 
-// A library that speaks WebGPU, loaded. Libraries stay loaded: their threads may live as long as the program.
+// A loaded WebGPU library. Never unloaded: its threads may live as long as the program.
 struct WebGpuApi {
 #define ANCHORSPLAT_WEBGPU_MEMBER(name) WGPUProc##name name = nullptr;
   ANCHORSPLAT_WEBGPU_FUNCTIONS(ANCHORSPLAT_WEBGPU_MEMBER)
 #undef ANCHORSPLAT_WEBGPU_MEMBER
-  // Standard, but a stub in wgpu-native, whose own way to wait is DevicePoll.
+  // Standard, but a stub in wgpu-native, which waits by DevicePoll instead.
   WGPUProcInstanceWaitAny InstanceWaitAny = nullptr;
   WGPUProcHasInstanceFeature HasInstanceFeature = nullptr;
-  // Standard, for the GPU's clock.
+  // Standard, for timestamps.
   WGPUProcDeviceCreateQuerySet DeviceCreateQuerySet = nullptr;
   WGPUProcCommandEncoderResolveQuerySet CommandEncoderResolveQuerySet = nullptr;
-  // wgpu-native's own, null in others; declared in its wgpu.h, which is not needed for them.
+  // Extensions of wgpu-native (its wgpu.h), null in other libraries.
   WGPUBool (*DevicePoll)(WGPUDevice device, WGPUBool wait, const uint64_t* submission) = nullptr;
   size_t (*InstanceEnumerateAdapters)(WGPUInstance instance, const void* options, WGPUAdapter* adapters) = nullptr;
-  float (*QueueGetTimestampPeriod)(WGPUQueue queue) = nullptr;  // nanoseconds; others count in these
+  float (*QueueGetTimestampPeriod)(WGPUQueue queue) = nullptr;  // nanoseconds per tick; 1 in other libraries
   WGPUShaderModule (*DeviceCreateShaderModuleTrusted)(WGPUDevice device, const WGPUShaderModuleDescriptor* descriptor,
                                                       WGPUFlags checks) = nullptr;
 

@@ -12,7 +12,7 @@
 
 namespace anchorsplat {
 
-// What a run has allocated, all devices together.
+// Bytes allocated by a run on all devices.
 struct GpuMemoryOfRun {
   std::atomic<uint64_t> bytes = 0;
 };
@@ -39,7 +39,7 @@ class WebGpuDevice::Buffer final : public GpuBuffer {
   std::shared_ptr<WebGpuDevice> device_;
   WGPUBuffer handle_;
   std::shared_ptr<GpuMemoryOfRun> of_run_;
-  mutable uint64_t last_used_ = 0;  // number of the recording; under the device's mutex
+  mutable uint64_t last_used_ = 0;  // number of the recording; guarded by the device's mutex
 };
 
 }  // namespace anchorsplat

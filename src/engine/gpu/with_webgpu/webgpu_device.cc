@@ -13,9 +13,9 @@ namespace anchorsplat {
 
 namespace {
 
-// Short enough that a desktop's watchdog sees an answer in between.
-constexpr uint32_t kRecorded = 64;  // commands that are handed over at once
-constexpr uint32_t kSubmits = 32;   // until the queue is waited for: what it holds takes memory
+// Short enough for a desktop's GPU watchdog.
+constexpr uint32_t kRecorded = 64;  // commands per submit
+constexpr uint32_t kSubmits = 32;   // submits between waits, as queued work takes memory
 
 }  // namespace
 
@@ -39,20 +39,20 @@ Result<std::shared_ptr<WebGpuDevice>> WebGpuDevice::Open(WebGpuInstance& instanc
   descriptor.uncapturedErrorCallbackInfo.callback = [](WGPUDevice const*, WGPUErrorType type, WGPUStringView message,
                                                        void* failure, void*) {
     const char* what = type == WGPUErrorType_OutOfMemory ? "it has no memory left" : "it refused a command";
-    static_cast<GpuFailure*>(failure)->Set(Cat(what, " (", ReasonIn(TextOf(message)), ")"));
+    static_cast<GpuFailure*>(failure)->Set(Cat(what, " (", ReasonOf(TextOf(message)), ")"));
   };
   descriptor.deviceLostCallbackInfo.mode = WGPUCallbackMode_AllowSpontaneous;
   descriptor.deviceLostCallbackInfo.userdata1 = made->failure_;
   descriptor.deviceLostCallbackInfo.callback = [](WGPUDevice const*, WGPUDeviceLostReason, WGPUStringView message,
                                                   void* failure, void*) {
-    static_cast<GpuFailure*>(failure)->Set(Cat("the device was lost (", ReasonIn(TextOf(message)), ")"));
+    static_cast<GpuFailure*>(failure)->Set(Cat("the device was lost (", ReasonOf(TextOf(message)), ")"));
   };
   struct Answer {
     WGPUDevice device = nullptr;
     std::string message;
     bool done = false;
   };
-  auto* const answer = new Answer;  // freed once it is there
+  auto* const answer = new Answer;  // freed by the callback
   WGPURequestDeviceCallbackInfo callback = WGPU_REQUEST_DEVICE_CALLBACK_INFO_INIT;
   callback.mode = WGPUCallbackMode_AllowProcessEvents;
   callback.callback = [](WGPURequestDeviceStatus, WGPUDevice device, WGPUStringView message, void* to, void*) {
@@ -65,7 +65,7 @@ Result<std::shared_ptr<WebGpuDevice>> WebGpuDevice::Open(WebGpuInstance& instanc
   }
   const std::unique_ptr<Answer> answered(answer);
   if (answered->device == nullptr) {
-    return Error{ErrorCode::kNotFound, Cat(made->adapter_.name, " cannot be opened: ", ReasonIn(answered->message))};
+    return Error{ErrorCode::kNotFound, Cat(made->adapter_.name, " cannot be opened: ", ReasonOf(answered->message))};
   }
   made->device_ = answered->device;
   made->queue_ = api.DeviceGetQueue(made->device_);
@@ -78,7 +78,7 @@ Result<std::shared_ptr<WebGpuDevice>> WebGpuDevice::Open(WebGpuInstance& instanc
   return made;
 }
 
-// Devices that could be opened are kept for as long as the program runs (open_gpu.cc).
+// Opened devices are kept for the program's lifetime (open_gpu.cc).
 WebGpuDevice::~WebGpuDevice() = default;
 
 Status WebGpuDevice::FailureOr() const {
@@ -89,7 +89,7 @@ Status WebGpuDevice::FailureOr() const {
 
 void WebGpuDevice::PushErrorScopes() {
   const WebGpuApi& api = *instance_.api();
-  // Internal errors have no scope in wgpu-native; they are failures that stick.
+  // wgpu-native has no error scope for internal errors; they are sticky failures.
   api.DevicePushErrorScope(device_, WGPUErrorFilter_OutOfMemory);
   api.DevicePushErrorScope(device_, WGPUErrorFilter_Validation);
 }
@@ -101,7 +101,7 @@ WebGpuDevice::ScopedError WebGpuDevice::PopErrorScopes() {
   };
   ScopedError first;
   for (int scope = 0; scope < 2; ++scope) {
-    auto* const answer = new Answer;  // freed once it is there
+    auto* const answer = new Answer;  // freed by the callback
     WGPUPopErrorScopeCallbackInfo callback = WGPU_POP_ERROR_SCOPE_CALLBACK_INFO_INIT;
     callback.mode = WGPUCallbackMode_AllowProcessEvents;
     callback.callback = [](WGPUPopErrorScopeStatus, WGPUErrorType type, WGPUStringView message, void* to, void*) {
@@ -117,7 +117,7 @@ WebGpuDevice::ScopedError WebGpuDevice::PopErrorScopes() {
       return first;
     }
     if (first.type == WGPUErrorType_NoError && answer->type > WGPUErrorType_NoError) first = *answer;
-    if (SaysLost(answer->message)) failure_->Set(kGpuLost);
+    if (IsDeviceLost(answer->message)) failure_->Set(kGpuLost);
     delete answer;
   }
   return first;
@@ -132,7 +132,7 @@ WGPUBuffer WebGpuDevice::MakeBuffer(uint64_t bytes, WGPUBufferUsage usage, std::
   PushErrorScopes();
   WGPUBuffer buffer = api.DeviceCreateBuffer(device_, &descriptor);
   error = PopErrorScopes();
-  error.message = ReasonIn(error.message);
+  error.message = ReasonOf(error.message);
   if (error.type == WGPUErrorType_NoError && !failed()) return buffer;
   if (buffer != nullptr && !failed()) api.BufferRelease(buffer);
   return nullptr;
@@ -149,7 +149,7 @@ Result<GpuMemory> WebGpuDevice::Allocate(uint64_t bytes, std::string_view what) 
   const uint64_t rounded = (bytes + kParameterBytes - 1) / kParameterBytes * kParameterBytes;
   const auto of_run = internal::CurrentStorage().Get<GpuMemoryOfRun>();
   const uint64_t allowed = MaxGpuMemoryOfRun();
-  // Added first, so that two threads cannot both take what is left.
+  // Add first, so that two threads cannot both take the rest.
   const uint64_t in_use = of_run->bytes.fetch_add(rounded);
   if (in_use + rounded > allowed) {
     of_run->bytes -= rounded;
@@ -160,7 +160,7 @@ Result<GpuMemory> WebGpuDevice::Allocate(uint64_t bytes, std::string_view what) 
   constexpr WGPUBufferUsage kUsage = WGPUBufferUsage_Storage | WGPUBufferUsage_CopySrc | WGPUBufferUsage_CopyDst;
   ScopedError error;
   WGPUBuffer buffer = MakeBuffer(rounded, kUsage, what, error);
-  if (buffer == nullptr && !failed() && WaitForQueue()) {  // what was retired is free only now
+  if (buffer == nullptr && !failed() && WaitForQueue()) {  // frees retired buffers
     buffer = MakeBuffer(rounded, kUsage, what, error);
   }
   if (buffer == nullptr) {
@@ -181,7 +181,7 @@ void WebGpuDevice::Retire(WGPUBuffer buffer, uint64_t last_used) {
   Destroy(buffer);
 }
 
-// Also of a device that has failed, whose memory others may need.
+// Also for failed devices, as others may need the memory.
 void WebGpuDevice::Destroy(WGPUBuffer buffer) {
   if (instance_.broken()) return;
   const WebGpuApi& api = *instance_.api();
@@ -250,7 +250,7 @@ void WebGpuDevice::SubmitRecorded() {
     parameters_.clear();
   }
   WGPUCommandBuffer commands = api.CommandEncoderFinish(encoder_, nullptr);
-  // What is wrong with a command is told by now, and wgpu-native aborts on commands that are.
+  // Command errors have been reported by now, and wgpu-native aborts when bad commands are submitted.
   if (failed() || !HandOver(1, &commands)) return;
   api.CommandBufferRelease(commands);
   api.CommandEncoderRelease(encoder_);

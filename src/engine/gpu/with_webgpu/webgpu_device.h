@@ -18,11 +18,11 @@
 
 namespace anchorsplat {
 
-// Commands are recorded into one encoder and handed over every kRecorded commands. One mutex guards all of it, waits
-// included: not every library can be called from several threads.
+// Records commands into one encoder and submits them every kRecorded commands. One mutex guards everything, including
+// waits: not every library is thread-safe.
 class WebGpuDevice final : public GpuDevice, public std::enable_shared_from_this<WebGpuDevice> {
  public:
-  // `unchecked`: as of OpenUncheckedGpu, which the library can do. Errors (kNotFound): the driver's reason.
+  // `unchecked`: see OpenUncheckedGpu; the library must support it. Errors (kNotFound): the driver's reason.
   static Result<std::shared_ptr<WebGpuDevice>> Open(WebGpuInstance& instance, const FoundAdapter& adapter,
                                                     bool unchecked = false);
   ~WebGpuDevice() override;
@@ -47,18 +47,18 @@ class WebGpuDevice final : public GpuDevice, public std::enable_shared_from_this
 
  private:
   class Buffer;                                     // webgpu_buffer.h
-  static constexpr uint32_t kParameterBytes = 256;  // what an offset of a uniform buffer is a multiple of
+  static constexpr uint32_t kParameterBytes = 256;  // alignment of uniform buffer offsets
 
   struct Pipeline {
     WGPUComputePipeline pipeline = nullptr;
-    WGPUBindGroupLayout layout = nullptr;  // null: not asked for yet
+    WGPUBindGroupLayout layout = nullptr;  // null: not queried yet
   };
   struct ScopedError {
     WGPUErrorType type = WGPUErrorType_NoError;
     std::string message;
   };
 
-  // A call at work: alone, and its time counts.
+  // Scope of a call: holds the mutex and counts the time.
   class Working {
    public:
     explicit Working(WebGpuDevice& device) : device_(device), lock_(device.mutex_) {}
@@ -74,7 +74,7 @@ class WebGpuDevice final : public GpuDevice, public std::enable_shared_from_this
 
   WebGpuDevice(WebGpuInstance& instance, GpuAdapter adapter) : instance_(instance), adapter_(std::move(adapter)) {}
 
-  // All of these under the mutex.
+  // All require the mutex.
   void Record(const GpuKernel& kernel, std::span<const std::byte> parameters,
               std::initializer_list<GpuBinding> bindings, uint32_t groups);
   bool EnsureClock();
@@ -101,25 +101,25 @@ class WebGpuDevice final : public GpuDevice, public std::enable_shared_from_this
 
   WebGpuInstance& instance_;
   GpuAdapter adapter_;
-  GpuFailure* const failure_ = new GpuFailure;  // never freed: the library may call back after the device's end
+  GpuFailure* const failure_ = new GpuFailure;  // never freed: the library may call back after the device is gone
   WGPUDevice device_ = nullptr;
   WGPUQueue queue_ = nullptr;
 
   std::mutex mutex_;
   WGPUCommandEncoder encoder_ = nullptr;
   WGPUComputePassEncoder pass_ = nullptr;
-  uint64_t recording_ = 1;             // number of what is recorded now; counts up when it is handed over
-  uint32_t commands_ = 0;              // recorded
-  uint32_t submits_ = 0;               // since the queue was last waited for
-  uint64_t bytes_written_ = 0;         // that the queue holds copies of
-  std::vector<std::byte> parameters_;  // of the recorded dispatches, kParameterBytes each
+  uint64_t recording_ = 1;             // number of the current recording; incremented by a submit
+  uint32_t commands_ = 0;              // in the current recording
+  uint32_t submits_ = 0;               // since the last wait for the queue
+  uint64_t bytes_written_ = 0;         // held as copies by the queue
+  std::vector<std::byte> parameters_;  // of recorded dispatches, kParameterBytes each
   WGPUBuffer parameter_slots_ = nullptr;
-  std::vector<WGPUBuffer> retired_;  // destroyed by their owners, still used by what is recorded
-  WGPUBuffer staging_ = nullptr;     // to be mapped for reading
+  std::vector<WGPUBuffer> retired_;  // freed by their owners, still in use by recorded work
+  WGPUBuffer staging_ = nullptr;     // mapped for reading
   uint64_t staging_bytes_ = 0;
   std::unordered_map<const GpuKernel*, Pipeline> pipelines_;
   bool unchecked_ = false;
-  WGPUQuerySet ticks_ = nullptr;  // before and after a kernel
+  WGPUQuerySet ticks_ = nullptr;  // timestamps before and after a kernel
   WGPUBuffer resolved_ticks_ = nullptr;
   std::atomic<double> seconds_ = 0;
   std::atomic<int64_t> waits_ = 0;

@@ -53,7 +53,7 @@ GpuAdapter::Type TypeOf(WGPUAdapterType type) {
   }
 }
 
-// What every kernel may use: the least that WebGPU promises of a device that is not in its compatibility mode.
+// Limits that every kernel can rely on: the minimum of WebGPU outside its compatibility mode.
 std::string WhyUnusable(const WGPUAdapterInfo& info, const WGPULimits& limits) {
   if (info.backendType == WGPUBackendType_Null) return "it is a null adapter, which calculates nothing";
   if (limits.maxStorageBuffersPerShaderStage < 8) {
@@ -68,7 +68,7 @@ std::string WhyUnusable(const WGPUAdapterInfo& info, const WGPULimits& limits) {
   return {};
 }
 
-// A binding is a multiple of 4 bytes, and 256 bytes are the step of its offset; a size without end stays below 2^63.
+// Bindings are multiples of 4 bytes, offsets of 256 bytes; "unlimited" sizes are capped below 2^63.
 uint64_t WholeSteps(uint64_t bytes) { return std::min(bytes, uint64_t{1} << 62) / 256 * 256; }
 
 GpuAdapter Describe(const WebGpuApi& api, WGPUAdapter adapter) {
@@ -145,8 +145,7 @@ WebGpuInstance::WebGpuInstance() {
 }
 
 bool WebGpuInstance::WaitUntil(const std::function<bool()>& done, WGPUDevice device, WGPUFuture future) {
-  // The library's own waits end when there is nothing left to wait for: so many ends without the answer, and none
-  // comes.
+  // The library's waits return when nothing is pending: after this many returns without an answer, none will come.
   constexpr int kPatience = 10000;
   constexpr uint64_t kNanoseconds = 100'000'000;
   for (int ends = 0; !done() && ends < kPatience;) {
@@ -177,7 +176,7 @@ std::vector<FoundAdapter> WebGpuInstance::Adapters() {
     handles.resize(api_->InstanceEnumerateAdapters(instance_, nullptr, nullptr));
     if (!handles.empty()) api_->InstanceEnumerateAdapters(instance_, nullptr, handles.data());
   } else {
-    // The standard can only be asked for one that fits.
+    // The standard can only request a matching adapter, not list them.
     for (const auto& [preference, fallback] :
          {std::pair(WGPUPowerPreference_HighPerformance, 0), std::pair(WGPUPowerPreference_LowPower, 0),
           std::pair(WGPUPowerPreference_Undefined, 1)}) {
@@ -197,7 +196,7 @@ std::vector<FoundAdapter> WebGpuInstance::Adapters() {
       };
       callback.userdata1 = answer;
       const WGPUFuture future = api_->InstanceRequestAdapter(instance_, &options, callback);
-      // An answer that is still to come keeps its place.
+      // A pending callback still writes to its slot.
       if (!WaitUntil([&] { return answer->done; }, nullptr, future)) continue;
       if (answer->adapter != nullptr) handles.push_back(answer->adapter);
       delete answer;

@@ -17,7 +17,7 @@
 
 namespace anchorsplat {
 
-// An adapter for as long as something is asked of it.
+// Owns an adapter handle.
 class AdapterHandle {
  public:
   AdapterHandle(const WebGpuApi& api, WGPUAdapter adapter) : api_(api), adapter_(adapter) {}
@@ -36,25 +36,25 @@ struct FoundAdapter {
   std::unique_ptr<AdapterHandle> handle;
 };
 
-// The library and its instance: one of the process, never given back, as drivers have threads that outlive main().
+// The library and its instance: one per process, never released, as driver threads outlive main().
 class WebGpuInstance {
  public:
-  // Made at the first call; `problem` of those after a failure is the same.
+  // Created by the first call; a failure is permanent.
   static WebGpuInstance& OfProcess();
   static void SetModuleFolder(const std::filesystem::path& folder);
 
-  // Null where there is no library; then problem() is one sentence.
+  // Null without a library; problem() then gives the reason in one sentence.
   const WebGpuApi* api() const { return api_ ? &*api_ : nullptr; }
   const std::string& problem() const { return problem_; }
   WGPUInstance get() const { return instance_; }
 
   std::vector<FoundAdapter> Adapters();
 
-  // Runs callbacks until `done`; waits for the GPU meanwhile where `device` is given. False: it will not be done, as
-  // the library has given up or answers nothing any more.
+  // Runs callbacks until `done`; waits for the GPU meanwhile if `device` is given. False: the library failed or stopped
+  // answering.
   bool WaitUntil(const std::function<bool()>& done, WGPUDevice device, WGPUFuture future);
 
-  // After an abort in the library (abort_guard.h) nothing more of it is called.
+  // Set after an abort in the library (abort_guard.h), which must then not be called any more.
   bool broken() const { return broken_; }
   void Break() { broken_ = true; }
 

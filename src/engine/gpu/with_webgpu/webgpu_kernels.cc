@@ -170,7 +170,7 @@ std::optional<double> WebGpuDevice::RunTimed(const GpuKernel& kernel, std::span<
   std::memcpy(ticks, from, kBytes);
   api.BufferUnmap(staging_);
   const double period = api.QueueGetTimestampPeriod == nullptr ? 1.0 : double{api.QueueGetTimestampPeriod(queue_)};
-  if (ticks[1] < ticks[0]) return std::nullopt;  // the clock was set back
+  if (ticks[1] < ticks[0]) return std::nullopt;  // the clock was reset
   return 1e-9 * period * static_cast<double>(ticks[1] - ticks[0]);
 }
 

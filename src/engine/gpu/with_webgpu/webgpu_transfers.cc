@@ -10,14 +10,14 @@
 namespace anchorsplat {
 
 namespace {
-constexpr uint64_t kPiece = 64 << 20;        // bytes of one transfer
-constexpr uint64_t kMaxWritten = 256 << 20;  // bytes whose copies the queue may hold
+constexpr uint64_t kPiece = 64 << 20;        // bytes per transfer
+constexpr uint64_t kMaxWritten = 256 << 20;  // bytes that the queue may hold as copies
 }  // namespace
 
 void WebGpuDevice::Write(const GpuBuffer& buffer, uint64_t offset, std::span<const std::byte> data) {
   const Working working(*this);
   if (failed() || data.empty()) return;
-  // The queue writes before all that is still to be handed over.
+  // Queue writes come before anything not yet submitted.
   if (Buffer::LastUsed(buffer) == recording_) SubmitRecorded();
   for (uint64_t at = 0; at < data.size() && !failed(); at += kPiece) {
     const uint64_t bytes = std::min<uint64_t>(kPiece, data.size() - at);
@@ -32,7 +32,7 @@ bool WebGpuDevice::WaitForAnswer(const Ask& ask) {
   struct Answer {
     bool done = false, good = false;
   };
-  auto* const answer = new Answer;  // freed once it is there
+  auto* const answer = new Answer;  // freed by the callback
   ++waits_;
   const WGPUFuture future = ask(answer);
   const bool answered = instance_.WaitUntil([&] { return answer->done; }, device_, future);
@@ -49,7 +49,7 @@ bool WebGpuDevice::WaitForQueue() {
   SubmitRecorded();
   if (failed()) return false;
   submits_ = 0;
-  if (bytes_written_ > 0) {  // written since, and not handed over by itself
+  if (bytes_written_ > 0) {  // written since, not submitted automatically
     if (!HandOver(0, nullptr)) return false;
     bytes_written_ = 0;
   }
@@ -92,8 +92,7 @@ bool WebGpuDevice::EnsureStaging(uint64_t bytes) {
   return true;
 }
 
-// Hands over what was recorded and waits for the first bytes of `staging_`, which are to be unmapped afterwards. Null:
-// the device has failed.
+// Submits and maps the first bytes of `staging_`, to be unmapped afterwards. Null: the device has failed.
 const std::byte* WebGpuDevice::MapStaging(uint64_t bytes) {
   SubmitRecorded();
   if (failed()) return nullptr;
@@ -109,14 +108,14 @@ const std::byte* WebGpuDevice::MapStaging(uint64_t bytes) {
     return instance_.api()->BufferMapAsync(staging_, WGPUMapMode_Read, 0, bytes, callback);
   });
   if (!mapped) return nullptr;
-  submits_ = 0;  // all that was handed over is done
+  submits_ = 0;  // all submitted work is done
   bytes_written_ = 0;
   const void* const from = instance_.api()->BufferGetConstMappedRange(staging_, 0, bytes);
   if (from == nullptr) failure_->Set("what was calculated cannot be read");
   return static_cast<const std::byte*>(from);
 }
 
-// Together at most kPiece.
+// At most kPiece in total.
 bool WebGpuDevice::ReadPieces(std::span<const GpuRead> pieces) {
   const WebGpuApi& api = *instance_.api();
   uint64_t bytes = 0;

@@ -17,7 +17,7 @@ namespace anchorsplat {
 
 namespace {
 
-// What libtiff sees: bytes in memory, and the first thing that it complains of.
+// Source for libtiff: bytes in memory, and its first error.
 struct TiffBytes {
   std::string bytes;
   toff_t position = 0;
@@ -26,7 +26,7 @@ struct TiffBytes {
 
 tmsize_t ReadBytes(thandle_t handle, void* to, tmsize_t count) {
   auto& file = *static_cast<TiffBytes*>(handle);
-  // Never -1: libtiff 4.5 counts it as bytes read, and clears what lies before its buffer.
+  // Never -1: libtiff 4.5 adds it to the bytes read and clears memory before its buffer.
   if (count < 0 || file.position > file.bytes.size()) return 0;
   const size_t taken = std::min(static_cast<size_t>(count), file.bytes.size() - static_cast<size_t>(file.position));
   std::memcpy(to, file.bytes.data() + file.position, taken);
@@ -54,22 +54,22 @@ int OnError(TIFF*, void* user, const char*, const char* format, va_list values) 
   return 1;
 }
 
-int OnWarning(TIFF*, void*, const char*, const char*, va_list) { return 1; }  // about tags that are not used
+int OnWarning(TIFF*, void*, const char*, const char*, va_list) { return 1; }  // about unused tags
 
 struct TiffCloser {
   void operator()(TIFF* tiff) const { TIFFClose(tiff); }
 };
 
-// What the file says of its picture.
+// Layout of the image in the file.
 struct TiffLayout {
   uint32_t width = 0, height = 0;
   uint16_t bits = 1, samples = 1, format = SAMPLEFORMAT_UINT, photometric = PHOTOMETRIC_MINISBLACK;
   uint16_t planar = PLANARCONFIG_CONTIG, compression = COMPRESSION_NONE, orientation = 1;
-  int colors = 1;              // of the samples: grey or rgb
-  bool alpha = false;          // the sample behind them
-  bool premultiplied = false;  // by which the colours are multiplied
+  int colors = 1;              // colour samples: grey 1, rgb 3
+  bool alpha = false;          // one sample after them
+  bool premultiplied = false;  // colours are multiplied by alpha
 
-  // The samples that lie together, of one pixel.
+  // Interleaved samples per pixel.
   int together() const { return planar == PLANARCONFIG_SEPARATE ? 1 : samples; }
   uint64_t bytes() const { return uint64_t{width} * height * samples * (bits / 8u); }
 };
@@ -96,7 +96,7 @@ class TiffPicture {
   Result<Image> Decode() {
     ANCHORSPLAT_RETURN_IF_ERROR(CheckLayout());
     ANCHORSPLAT_RETURN_IF_ERROR(CheckPages());
-    ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(name_, file_.bytes.size(), layout_.bytes()));
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckCompressionRatio(name_, file_.bytes.size(), layout_.bytes()));
     image_ = Image(static_cast<int>(layout_.width), static_cast<int>(layout_.height), layout_.alpha ? 4 : 3);
     ANCHORSPLAT_RETURN_IF_ERROR(TIFFIsTiled(tiff_.get()) != 0 ? ReadTiles() : ReadStrips());
     if (layout_.premultiplied) DivideByAlpha();
@@ -136,7 +136,7 @@ class TiffPicture {
     return {};
   }
 
-  // Kinds of picture that are known here; what is extra and no alpha is left out, as the format says.
+  // Supported layouts; extra samples that are not alpha are dropped, as the format says.
   Status CheckLayout() {
     TiffLayout& l = layout_;
     constexpr int kMostSamples = 8;
@@ -168,7 +168,7 @@ class TiffPicture {
     return {};
   }
 
-  // Smaller ones and masks go with the first picture; another as large as it is a picture of its own.
+  // Smaller images and masks belong to the first; another of its size is a separate image.
   Status CheckPages() {
     constexpr int kMost = 64;
     int pages = 1;
@@ -189,8 +189,7 @@ class TiffPicture {
     return {};
   }
 
-  // Rows `y` to `y + rows` and columns `x` to `x + columns`, as far as the picture goes; `stride` bytes to the next
-  // row.
+  // Converts rows `y` to `y + rows` and columns `x` to `x + columns`, clipped to the image; `stride`: bytes per row.
   void Store(const std::vector<uint8_t>& block, size_t stride, int plane, uint32_t x, uint32_t y, uint32_t columns,
              uint32_t rows) {
     const TiffLayout& l = layout_;
@@ -223,7 +222,7 @@ class TiffPicture {
     }
   }
 
-  // Bytes of a block, where it is no larger than `most` and has room for its own pixels.
+  // Size of a block in bytes, if at most `most` and enough for its pixels.
   Result<size_t> BlockSize(tmsize_t size, uint64_t columns, uint64_t rows) const {
     const uint64_t needed = columns * rows * static_cast<uint64_t>(layout_.together()) * (layout_.bits / 8u);
     const uint64_t most = 4 * layout_.bytes() + (uint64_t{1} << 22);
@@ -289,7 +288,7 @@ class TiffPicture {
   TiffBytes file_;
   TiffLayout layout_;
   Image image_;
-  std::unique_ptr<TIFF, TiffCloser> tiff_;  // let go first: it reads from file_
+  std::unique_ptr<TIFF, TiffCloser> tiff_;  // destroyed first: it reads from file_
 };
 
 }  // namespace

@@ -164,8 +164,10 @@ TEST(Tiff, DamagedFilesAreErrorsOrPictures) {
       std::string changed = whole;
       for (const int value : {0, 1, 0x7f, 0xff}) {
         changed[n] = static_cast<char>(value);
-        (void)DecodeTiff("changed", changed);
-        (void)DecodeTiffSize("changed", changed);
+        const auto image = DecodeTiff("changed", changed);
+        EXPECT_TRUE(image.ok() || image.error().code == ErrorCode::kBadFile) << n << " " << value;
+        const auto size = DecodeTiffSize("changed", changed);
+        EXPECT_TRUE(size.ok() || size.error().code == ErrorCode::kBadFile) << n << " " << value;
       }
     }
   }

@@ -446,7 +446,7 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
     of_block = {};
     result.cloud = output.Finish(result.chosen);
     result.times.order = watch.Lap();
-  } catch (const NoDiskRoom& none) {
+  } catch (const DiskFull& none) {
     return Error{ErrorCode::kIo, none.what()};
   } catch (const std::bad_alloc&) {
     return Error{ErrorCode::kBadArgument, Cat("no memory for ", WithThousands(n * copies), " Gaussians")};

@@ -20,7 +20,7 @@ namespace anchorsplat {
 namespace {
 
 constexpr float kLargestLogit = 20;
-constexpr float kLargestLogScale = 5;
+constexpr float kMaxLogScale = 5;
 constexpr float kLargestSh = 10;
 // Anchors whose Gaussians are made at once: 20 copies of them are 5 MB and stay in the cache until they are restored.
 constexpr int64_t kHeadRows = 1024;
@@ -77,7 +77,7 @@ void Finish(float anchor_log_scale, bool upstream, int64_t row, GaussianCloud& o
   const auto clamp = [](float& value, float low, float high) {
     if (std::isfinite(value)) value = std::clamp(value, low, high);
   };
-  const float largest = upstream ? kLargestLogScale : std::max(kLargestLogScale, anchor_log_scale);
+  const float largest = upstream ? kMaxLogScale : std::max(kMaxLogScale, anchor_log_scale);
   for (int64_t a = 0; a < 3; ++a) {
     clamp(out.log_scales.data()[3 * row + a], std::numeric_limits<float>::lowest(), largest);
   }

@@ -4,8 +4,8 @@
 
 namespace anchorsplat {
 
-// Only ASCII: other letters differ between encodings anyway.
-inline std::string SmallLetters(std::string text) {
+// Converts ASCII letters to lower case; others differ between encodings.
+inline std::string AsciiLowerCase(std::string text) {
   for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
   return text;
 }

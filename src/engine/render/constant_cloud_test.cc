@@ -1,4 +1,4 @@
-#include "render/still_cloud.h"
+#include "render/constant_cloud.h"
 
 #include <gtest/gtest.h>
 
@@ -40,7 +40,7 @@ std::vector<RenderOutput> DrawOneByOne(const CloudView& cloud, const std::vector
 
 std::vector<RenderOutput> DrawEach(const CloudView& cloud, const std::vector<Camera>& cameras,
                                    const RenderOptions& options) {
-  StillCloud still(cloud);
+  ConstantCloud still(cloud);
   Rasterizer rasterizer;
   std::vector<RenderOutput> outputs;
   const Status status = rasterizer.RenderEach(still, cameras, options, [&](size_t k, RenderOutput& output) -> Status {
@@ -58,7 +58,7 @@ void ExpectSameBits(const std::vector<RenderOutput>& some, const std::vector<Ren
   for (size_t k = 0; k < some.size(); ++k) EXPECT_TRUE(SameBits(some[k], others[k])) << k;
 }
 
-TEST(StillCloudTest, OnTheCpuEachPictureIsAsByItself) {
+TEST(ConstantCloudTest, OnTheCpuEachPictureIsAsByItself) {
   const GaussianCloud cloud = RandomCloud(5, {.gaussians = 200});
   RenderOptions options;
   options.depth = true;
@@ -66,9 +66,9 @@ TEST(StillCloudTest, OnTheCpuEachPictureIsAsByItself) {
   ExpectSameBits(DrawEach(cloud, cameras, options), DrawOneByOne(cloud, cameras, options));
 }
 
-TEST(StillCloudTest, AnErrorIsThatOfItsPicture) {
+TEST(ConstantCloudTest, AnErrorIsThatOfItsPicture) {
   const GaussianCloud cloud = RandomCloud(5, {.gaussians = 50});
-  StillCloud still(cloud);
+  ConstantCloud still(cloud);
   std::vector<Camera> cameras = SomeCameras(4);
   cameras[2].intrinsics.fx = -1;
   Rasterizer rasterizer;
@@ -83,7 +83,7 @@ TEST(StillCloudTest, AnErrorIsThatOfItsPicture) {
   EXPECT_EQ(rasterizer.RenderEach(still, cameras, {}, refuse).error().message, "the disk is full");
 }
 
-class GpuStillCloudTest : public testing::Test {
+class GpuConstantCloudTest : public testing::Test {
  protected:
   void SetUp() override {
     device_ = GpuForTest();
@@ -95,13 +95,13 @@ class GpuStillCloudTest : public testing::Test {
   std::shared_ptr<GpuDevice> device_;
 };
 
-TEST_F(GpuStillCloudTest, IsUploadedOnce) {
+TEST_F(GpuConstantCloudTest, IsUploadedOnce) {
   const RunScope run({.device = kGpu});
   const auto device = With({});
   const ScopedGpuForTest scoped(device);
   const GaussianCloud cloud = RandomCloud(1, {.gaussians = 1000});
   const auto all = static_cast<int64_t>(sizeof(float) * (cloud.means.size() + cloud.sh.size()));
-  StillCloud still(cloud);
+  ConstantCloud still(cloud);
   Rasterizer rasterizer;
   RenderOutput output;
   RenderOptions options;
@@ -125,7 +125,7 @@ TEST_F(GpuStillCloudTest, IsUploadedOnce) {
   EXPECT_EQ(gradient.sh, of_arrays.sh);
 }
 
-TEST_F(GpuStillCloudTest, PicturesTogetherHaveTheirBits) {
+TEST_F(GpuConstantCloudTest, PicturesTogetherHaveTheirBits) {
   const RunScope run({.device = kGpu});
   const ScopedGpuForTest scoped(device_);
   for (const bool depth : {false, true}) {
@@ -146,7 +146,7 @@ TEST_F(GpuStillCloudTest, PicturesTogetherHaveTheirBits) {
   ExpectSameBits(DrawEach(nothing, SomeCameras(3), {}), DrawOneByOne(nothing, SomeCameras(3), {}));
 }
 
-TEST_F(GpuStillCloudTest, WhatIsMoreThanExpectedIsDrawnByItself) {
+TEST_F(GpuConstantCloudTest, WhatIsMoreThanExpectedIsDrawnByItself) {
   const RunScope run({.device = kGpu});
   const ScopedGpuForTest scoped(device_);
   const GaussianCloud cloud = RandomCloud(8, {.gaussians = 6000});
@@ -170,7 +170,7 @@ TEST_F(GpuStillCloudTest, WhatIsMoreThanExpectedIsDrawnByItself) {
   ExpectSameBits(DrawEach(cloud, SomeCameras(3), few), DrawOneByOne(cloud, SomeCameras(3), few));
 }
 
-TEST_F(GpuStillCloudTest, WhateverFailsThePicturesAreThere) {
+TEST_F(GpuConstantCloudTest, WhateverFailsThePicturesAreThere) {
   const GaussianCloud cloud = RandomCloud(3, {.gaussians = 300});
   const std::vector<Camera> cameras = SomeCameras(4);
   const auto expected = DrawOneByOne(cloud, cameras, {});
@@ -194,10 +194,10 @@ TEST_F(GpuStillCloudTest, WhateverFailsThePicturesAreThere) {
   tally.ExpectEqual();
 }
 
-TEST_F(GpuStillCloudTest, GoesWithTheRunFromDeviceToDevice) {
+TEST_F(GpuConstantCloudTest, GoesWithTheRunFromDeviceToDevice) {
   const GaussianCloud cloud = RandomCloud(4, {.gaussians = 100});
   const Camera camera = RandomCamera(4, 48, 48);
-  StillCloud still(cloud);
+  ConstantCloud still(cloud);
   Rasterizer rasterizer;
   RenderOutput on_gpu, on_cpu, again;
   {

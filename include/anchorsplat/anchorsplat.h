@@ -1,6 +1,6 @@
 #pragma once
 
-// All of it.
+// The whole library.
 #include <anchorsplat/compare.h>
 #include <anchorsplat/enhance.h>
 #include <anchorsplat/error.h>

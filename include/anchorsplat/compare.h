@@ -10,8 +10,8 @@
 
 namespace anchorsplat {
 
-// Peak signal-to-noise ratio in dB over the first three channels, peak 1; infinite for equal pictures. Values are taken
-// as they are: clamp renders first. kBadArgument: shapes differ, empty pictures.
+// Peak signal-to-noise ratio in dB over the first three channels, peak 1; infinite for equal pictures. Values are not
+// clamped: clamp renders first. kBadArgument: different shapes, empty pictures.
 ANCHORSPLAT_PUBLIC Expected<double> Psnr(const Picture& a, const Picture& b, const RunSettings& run = {});
 
 // Mean structural similarity (Wang et al. 2004), 11×11 Gaussian window. kBadArgument as above.
@@ -22,8 +22,8 @@ struct CaptionedPicture {
   const Picture* picture = nullptr;
 };
 
-// A picture for people: a column per picture with its caption, the part enlarged where they differ most, and the
-// differences to the last one. kBadArgument: none, or pictures of different or empty sizes.
+// A picture for people: one column per picture with caption, an enlargement of where they differ most, and differences
+// to the last picture. kBadArgument: no pictures, or different or empty sizes.
 ANCHORSPLAT_PUBLIC Expected<Picture> ComparisonSheet(std::span<const CaptionedPicture> pictures,
                                                      const RunSettings& run = {});
 

@@ -7,26 +7,26 @@
 
 namespace anchorsplat {
 
-// Errors are values: nothing in this library throws, apart from std::bad_alloc of what is only memory (Splat's
-// constructors, vectors that are returned).
+// Errors are values: nothing in this library throws, except std::bad_alloc where only memory is concerned (Splat's
+// constructors, returned vectors).
 
 enum class FailureKind {
-  kBadArgument,  // asked for something impossible
-  kNotFound,     // a file or folder is not there
-  kBadFile,      // bytes that are malformed, truncated, hostile or of an unsupported kind
-  kExists,       // would overwrite a file and was not told to
-  kIo,           // the system refused to read, to write or to give memory
-  kStopped,      // RunSettings::stop, where there is no result so far
+  kBadArgument,  // an impossible request
+  kNotFound,     // a missing file or folder
+  kBadFile,      // malformed, truncated, hostile or unsupported contents
+  kExists,       // the file exists and overwriting was not allowed
+  kIo,           // the system failed to read, write or provide memory
+  kStopped,      // stopped by RunSettings::stop without a result
 };
 
-// What went wrong, as one sentence for a person: file, byte or line, property, what was expected. Sentences call
-// settings by the program's options ("--pixel-size").
+// What went wrong, as one sentence for people: file, byte or line, property, what was expected. Settings are called by
+// the program's option names ("--pixel-size").
 struct Failure {
   FailureKind kind = FailureKind::kBadArgument;
   std::string message;
 };
 
-// A value or a Failure. Asking for the side that is not there throws std::bad_variant_access: look at ok() first.
+// A value or a Failure. Check ok() first: accessing the absent side throws std::bad_variant_access.
 template <typename T>
 class [[nodiscard]] Expected {
  public:

@@ -1,4 +1,4 @@
 #pragma once
 
-// What the shared library exports; everything else in it is hidden.
+// Marks exported symbols of the shared library; all others are hidden.
 #define ANCHORSPLAT_PUBLIC __attribute__((visibility("default")))

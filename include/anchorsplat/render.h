@@ -16,8 +16,8 @@
 
 namespace anchorsplat {
 
-// A camera without distortion, in OpenCV axes (x right, y down, z forward): p_camera = rotation·p_world + translation.
-// Pixel (0,0) covers [0,1)², its centre is at 0.5.
+// A camera without distortion in OpenCV axes (x right, y down, z forward): p_camera = rotation·p_world + translation.
+// Pixel (0,0) covers [0,1)²; its centre is at 0.5.
 struct PinholeCamera {
   std::string name = {};  // of the view
   int width = 0, height = 0;
@@ -26,37 +26,37 @@ struct PinholeCamera {
   std::array<double, 3> translation = {0, 0, 0};                 // world units
 };
 
-// `count` cameras of width × height pixels on a sphere around the splat, from where it fills them, upright as far as
-// the splat's comments say where up is. `fov` is the horizontal field of view, degrees. kBadArgument: count or size
-// below 1, a field of view that is not between 0 and 180.
+// `count` cameras of width × height pixels on a sphere around the splat, which fills their pictures. Upright if the
+// splat's comments say where up is. `fov`: horizontal field of view, degrees. kBadArgument: count or size below 1, fov
+// not between 0 and 180.
 ANCHORSPLAT_PUBLIC Expected<std::vector<PinholeCamera>> OrbitAround(const SplatView& splat, int count, int width,
                                                                     int height, double fov = 45);
 
-// The cameras of a transforms.json, an INRIA cameras.json, a poses_bounds.npy, a COLMAP model, or a file of Metashape,
-// OpenSfM or Bundler, or of a folder with one of them, in their order. Of a lens it is the pinhole that its pictures
-// are undone to (docs/fit.md). Failures: kNotFound, kIo, kBadFile; kBadArgument: a folder with several.
+// Reads cameras, in order, from a transforms.json, an INRIA cameras.json, a poses_bounds.npy, a COLMAP model, a file of
+// Metashape, OpenSfM or Bundler, or a folder with one of these. A camera with a lens becomes the pinhole of its
+// undistorted pictures (docs/fit.md). Failures: kNotFound, kIo, kBadFile; kBadArgument: a folder with several.
 ANCHORSPLAT_PUBLIC Expected<std::vector<PinholeCamera>> ReadCameraFile(const std::filesystem::path& path);
 
 struct RenderSettings {
   std::array<float, 3> background = {0, 0, 0};
-  std::optional<Rasterization> rasterization = std::nullopt;  // the splat's own otherwise, classic where it says none
-  // World units along z. Otherwise 0.01, or a thousandth of the distance to the splat where that is nearer; and no end.
+  std::optional<Rasterization> rasterization = std::nullopt;  // unset: the splat's own, else classic
+  // World units along z. Unset: 0.01, or a thousandth of the distance to the splat if that is less; no far plane.
   std::optional<float> near_plane = std::nullopt, far_plane = std::nullopt;
-  int sh_degree = 3;  // highest that is used
+  int sh_degree = 3;  // highest degree used
   bool depth = false;
 };
 
 struct Rendering {
-  Picture color;        // [3,H,W], not clamped above 1, background included
+  Picture color;        // [3,H,W] including background, not clamped above 1
   Picture alpha;        // [1,H,W] coverage
-  Picture depth;        // [1,H,W] expected camera z, 0 where nothing is; empty unless asked for
-  int64_t visible = 0;  // Gaussians that were not culled
+  Picture depth;        // [1,H,W] expected camera z, 0 where nothing is; empty unless requested
+  int64_t visible = 0;  // Gaussians not culled
 };
 
-// Draws the splat with the 3DGS rasterizer, one picture per camera, the same bits for any number of threads. Gaussians
-// with values that are not finite are not drawn. Where a picture shows nothing, a message of the run says why.
-// Failures: kBadArgument: CheckShape, a camera without pixels or with values that are not finite, settings out of
-// range; kIo: not enough memory; kStopped.
+// Renders the splat with the 3DGS rasterizer, one picture per camera; the same bits for any number of threads.
+// Gaussians with non-finite values are not drawn. If a picture shows nothing, a message of the run says why.
+// Failures: kBadArgument: CheckShape, a camera without pixels or with non-finite values, settings out of range; kIo:
+// not enough memory; kStopped.
 ANCHORSPLAT_PUBLIC Expected<std::vector<Rendering>> RenderViews(const SplatView& splat,
                                                                 std::span<const PinholeCamera> cameras,
                                                                 const RenderSettings& settings = {},

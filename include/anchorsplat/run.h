@@ -11,7 +11,7 @@ namespace anchorsplat {
 
 enum class MessageLevel { kInfo, kWarning };
 
-// How far a task has come. Tasks of a call follow each other.
+// Progress of a task. A call's tasks run one after another.
 struct TaskProgress {
   std::string task = {};  // "fit"
   int64_t done = 0;       // steps
@@ -20,31 +20,29 @@ struct TaskProgress {
   bool ended = false;
 };
 
-// How a call is run; results do not depend on any of it, but for rounding on a GPU. Every function that may take long
-// takes one as its last argument. Calls of several threads do not see each other: each has its own limit, callbacks and
-// flag.
+// How a call is run. Does not affect results, except for rounding on a GPU. Every function that may take long accepts
+// one as its last argument. Concurrent calls are independent: each has its own limits, callbacks and flags.
 //
-// Callbacks come from any thread of the call, one at a time. They must not throw. Without them nothing is said: the
-// library writes to neither stdout nor stderr.
+// Callbacks may come from any thread of the call, but one at a time. They must not throw. The library itself never
+// writes to stdout or stderr.
 struct RunSettings {
-  int threads = 0;                                                              // at most; 0: all of the machine
+  int threads = 0;                                                              // maximum; 0: all of the machine
   std::function<void(MessageLevel, const std::string& sentence)> message = {};  // may be empty
   std::function<void(const TaskProgress&)> progress = {};                       // may be empty
-  // Becomes true when the call is to end: optimisations return what they have so far and say so, others a
-  // FailureKind::kStopped, those that cannot tell go on. Must outlive the call.
+  // Set to true to stop the call: optimisations return their result so far, marked as stopped; others fail with
+  // FailureKind::kStopped; those that cannot stop continue. Must outlive the call.
   const std::atomic<bool>* stop = nullptr;
-  // Becomes true when nothing of the call is wanted any more: it ends at once and without a result, whatever it is
-  // about, as a FailureKind::kStopped. Files appear whole or not at all. Must outlive the call.
+  // Set to true to abandon the call: it ends at once without a result, with FailureKind::kStopped. Files still appear
+  // whole or not at all. Must outlive the call.
   const std::atomic<bool>* abandon = nullptr;
-  // What rasterizes (docs/gpu.md): "cpu"; "gpu", the first that can be used; "auto", a real GPU where there is one,
-  // else the CPU; or the number of an adapter, as `anchorsplat doctor` lists them. What cannot be had is a
-  // FailureKind::kNotFound before the call begins, another word a kBadArgument. A GPU that is lost meanwhile is told by
-  // a message, and the call goes on on the CPU.
+  // What rasterizes (docs/gpu.md): "cpu"; "gpu": the first usable one; "auto": a real GPU if there is one, else the
+  // CPU; or an adapter's number in `anchorsplat doctor`. Unavailable: FailureKind::kNotFound before the call begins;
+  // another word: kBadArgument. If a GPU is lost during the call, a message says so and the call continues on the CPU.
   std::string device = "cpu";
-  uint64_t max_gpu_memory = 0;  // bytes of it at most; 0: 2 GiB
+  uint64_t max_gpu_memory = 0;  // bytes; 0: 2 GiB
 };
 
-// "0.1.0", of the library that is loaded.
+// Version of the loaded library, "0.1.0".
 ANCHORSPLAT_PUBLIC const char* LibraryVersion();
 
 }  // namespace anchorsplat

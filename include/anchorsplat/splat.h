@@ -13,38 +13,39 @@
 
 namespace anchorsplat {
 
-// How a splat wants to be drawn: as 3DGS (Kerbl et al. 2023) does it, where every Gaussian is widened by 0.3 px²; with
+// How a splat is to be rendered: as in 3DGS (Kerbl et al. 2023), where every Gaussian is dilated by 0.3 px²; with
 // opacity compensated for that (gsplat's "antialiased"); or with opacity compensated for 0.1 px² (Mip-Splatting).
 enum class Rasterization { kClassic, kAntialiased, kMip };
 
-// Columns of N Gaussians that somebody else owns, row i of each belonging to Gaussian i: a Splat, NumPy arrays. Values
-// are *stored* ones, before activation, exactly as an INRIA PLY keeps them. Every function that only looks at a splat
-// takes this, and copies nothing. The arrays must stay where they are, unchanged, until the call returns.
+// Borrowed columns of N Gaussians (a Splat, NumPy arrays, …); row i of each belongs to Gaussian i. Values are *stored*
+// ones, before activation, as in an INRIA PLY. Functions that only read a splat take this and copy nothing. The arrays
+// must stay valid and unchanged until the call returns.
 struct SplatView {
   int sh_degree = 0;                      // 0–3
-  std::span<const float> means;           // [N,3] world units, from `origin` on
+  std::span<const float> means;           // [N,3] world units, relative to `origin`
   std::span<const float> log_scales;      // [N,3] ln(world units), one per axis of the rotation
   std::span<const float> quats;           // [N,4] wxyz, any norm
   std::span<const float> opacity_logits;  // [N] ln(o / (1 − o))
   std::span<const float> sh;              // [N,(sh_degree+1)²,3] coefficient-major, rgb fastest; [.,0,.] is f_dc
 
-  std::optional<Rasterization> rasterization = std::nullopt;  // nothing where nobody said
-  std::span<const std::string> comments;                      // of the file, and of what was done to the splat
-  // A Gaussian's position in the world is origin + mean, in double. Zero, but for coordinates that are too large for
-  // floats, such as those of maps. Cameras and regions are in the world.
+  std::optional<Rasterization> rasterization = std::nullopt;  // unset: unknown
+  std::span<const std::string> comments;                      // from the file, and about what was done to the splat
+  // World position of a Gaussian is origin + mean, in double. Zero unless coordinates are too large for float, as on
+  // maps.
+  // Cameras and regions are in world coordinates.
   std::array<double, 3> origin = {0, 0, 0};
 
   int64_t size() const { return static_cast<int64_t>(opacity_logits.size()); }
 };
 
-// Whether the columns fit together: kBadArgument with the one that does not. Values are not looked at. All functions
-// that take a view look themselves.
+// Checks that the columns have matching sizes; kBadArgument names the one that does not. Does not read values.
+// Functions that take a view check by themselves.
 ANCHORSPLAT_PUBLIC Expected<void> CheckShape(const SplatView& view);
 
-// The owner of a splat. Columns are those of SplatView; the values may be changed in place, the number of Gaussians
-// and the degree are fixed. To be moved, not copied (CopyOf); what was moved from is empty.
+// Owns a splat, with the columns of SplatView. Values can be changed in place; count and degree are fixed. Movable, not
+// copyable (use CopyOf); a moved-from Splat is empty.
 //
-// One thread may change a splat while nobody else looks at it; any number may look at the same time.
+// Not synchronised: concurrent reads are fine, writes need exclusive access.
 class ANCHORSPLAT_PUBLIC Splat {
  public:
   Splat();  // no Gaussians
@@ -52,7 +53,7 @@ class ANCHORSPLAT_PUBLIC Splat {
   Splat(Splat&& other) noexcept;
   Splat& operator=(Splat&& other) noexcept;
 
-  // All values zero. kBadArgument: a count that is not 0–2³¹, a degree that is not 0–3; kIo: not enough memory.
+  // All values zero. kBadArgument: count not in 0–2³¹, degree not in 0–3; kIo: not enough memory.
   static Expected<Splat> OfSize(int64_t count, int sh_degree);
   // kBadArgument: CheckShape; kIo: not enough memory.
   static Expected<Splat> CopyOf(const SplatView& view);
@@ -68,7 +69,7 @@ class ANCHORSPLAT_PUBLIC Splat {
   void set_comments(std::vector<std::string> comments);
   void set_origin(const std::array<double, 3>& origin);
 
-  // Valid until the splat is moved, assigned to or gone.
+  // Valid until the splat is moved, assigned to or destroyed.
   SplatView view() const;
   operator SplatView() const { return view(); }  // NOLINT: implicit on purpose
 

@@ -21,7 +21,7 @@
 #include "core/run_context.h"
 #include "io/input_record.h"
 
-// Between the public types (include/anchorsplat/) and ours.
+// Conversions between the public types (include/anchorsplat/) and the engine's.
 namespace anchorsplat {
 
 struct Splat::Owned {
@@ -40,15 +40,15 @@ std::optional<RenderMode> ToMode(std::optional<Rasterization> rasterization);
 std::optional<Rasterization> ToRasterization(std::optional<RenderMode> mode);
 Camera ToCamera(const PinholeCamera& camera);
 PinholeCamera ToPinhole(const Camera& camera);
-// kBadArgument: not as many values as the shape says.
+// kBadArgument: the number of values does not match the shape.
 Result<Image> ToImage(const Picture& picture);
 Picture ToPicture(const Image& image);
-// kBadArgument: RunSettings::device.
+// kBadArgument: an unknown RunSettings::device.
 Result<RunContext> ToContext(const RunSettings& run);
-// Opens what RunSettings::device asks for. kNotFound: it cannot be.
+// Opens the device of RunSettings::device. kNotFound: unavailable.
 Status OpenDevice();
 
-// What a call of ours comes to, as the caller of the library gets it: in a run of its own, and without exceptions.
+// Runs `call` in a run of its own and converts its result for the library's caller; catches all exceptions.
 template <typename T, typename Call>
 Expected<T> InRun(const RunSettings& run, Call&& call) try {
   auto context = ToContext(run);

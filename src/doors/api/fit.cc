@@ -81,7 +81,7 @@ Result<FitOutcome> FitTo(const std::filesystem::path& project, const GaussianClo
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(options));
   InitialPoints points;
   if (start != nullptr) {
-    points = Thinned(PointsOf(*start, views.origin), settings.initial_points);
+    points = SubsampleEvenly(PointsOf(*start, views.origin), settings.initial_points);
   } else {
     ANCHORSPLAT_ASSIGN_OR_RETURN(
         points, InitialPointsOf(InitOf(settings.starting_points), views, settings.initial_points, settings.seed,

@@ -43,7 +43,7 @@ RenderOptions ToOptions(const CloudView& cloud, const RenderSettings& settings) 
   options.mode = ToMode(settings.rasterization).value_or(options.mode);
   if (settings.near_plane) {
     options.near_plane = *settings.near_plane;
-    options.subject.reset();  // as it was said
+    options.subject.reset();  // near_plane was given
   }
   if (settings.far_plane) options.far_plane = *settings.far_plane;
   options.sh_degree = settings.sh_degree;

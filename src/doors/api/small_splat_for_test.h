@@ -10,7 +10,7 @@
 
 namespace anchorsplat {
 
-// For tests: coloured Gaussians in a ball of radius 0.5, the same on every machine.
+// Coloured Gaussians in a ball of radius 0.5, the same on every machine.
 inline Splat SmallSplat(int64_t count, int sh_degree, uint32_t seed) {
   Splat splat = *Splat::OfSize(count, sh_degree);
   std::minstd_rand random(seed);

@@ -52,7 +52,7 @@ void PrintTable(const SplatFindings& f) {
             << "  file         " << HumanBytes(f.file_bytes) << (f.format.empty() ? "" : ", " + f.format) << "\n"
             << "  render mode  " << ModeName(f.render_mode) << "\n";
   if (!f.render_mode && !f.lost_no_width) {
-    std::cout << "  looks like   " << LooksInWords(f) << "\n";
+    std::cout << "  looks like   " << DescribeProvenance(f) << "\n";
   }
   std::cout << "  can sharpen  " << TreatmentInWords(f) << "\n";
   for (const std::string& credit : CreditsOf(f.comments)) {

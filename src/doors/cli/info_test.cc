@@ -41,7 +41,7 @@ TEST_F(InfoVerb, OfASplat) {
   EXPECT_THAT(table.out, Not(HasSubstr("looks like"))) << "as the file says its render mode";
   EXPECT_THAT(table.out, ContainsRegex("can sharpen  yes: network, pixel size 0.00[0-9]+, about .[0-9.]+ dB at 4x"));
   EXPECT_EQ(json["reading"]["looks"], "classic");
-  EXPECT_EQ(json["reading"]["probabilities"].size(), kMadeCount);
+  EXPECT_EQ(json["reading"]["probabilities"].size(), kProvenanceCount);
   EXPECT_NEAR(json["reading"]["pixel"].get<double>(), 0.0055, 0.002);
   EXPECT_LT(json["reading"]["low"], json["reading"]["pixel"]);
   EXPECT_GT(json["reading"]["high"], json["reading"]["pixel"]);

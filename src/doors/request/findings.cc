@@ -12,7 +12,7 @@ namespace anchorsplat {
 
 nlohmann::json ToJson(const Reading& reading) {
   nlohmann::json made;
-  for (size_t k = 0; k < kMadeCount; ++k) made[NameOf(static_cast<Made>(k))] = reading.made[k];
+  for (size_t k = 0; k < kProvenanceCount; ++k) made[NameOf(static_cast<Provenance>(k))] = reading.provenance[k];
   return {{"looks", NameOf(reading.likeliest())},
           {"probabilities", made},
           {"pixel", reading.pixel},

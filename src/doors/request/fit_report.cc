@@ -19,7 +19,7 @@ nlohmann::json ToJson(const ViewQuality& quality) {
 
 Result<ChosenStart> ChooseFitStart(const FitFlags& flags, const TrainingViews& views, const std::string& project,
                                    uint64_t seed, const GaussianCloud* splat) {
-  if (splat != nullptr) return ChosenStart{Thinned(PointsOf(*splat, views.origin), flags.init_points), "splat"};
+  if (splat != nullptr) return ChosenStart{SubsampleEvenly(PointsOf(*splat, views.origin), flags.init_points), "splat"};
   if (!flags.init_splat.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadCloud(flags.init_splat));
     InitialPoints points = PointsOf(cloud, views.origin);
@@ -27,7 +27,7 @@ Result<ChosenStart> ChooseFitStart(const FitFlags& flags, const TrainingViews& v
       LogWarning(Cat(flags.init_splat, ": ", WithThousands(cloud.size() - points.size()), " of ",
                      WithThousands(cloud.size()), " Gaussians are unusable and skipped (see `info`)"));
     }
-    return ChosenStart{Thinned(points, flags.init_points), "splat"};
+    return ChosenStart{SubsampleEvenly(points, flags.init_points), "splat"};
   }
   if (flags.init == FitInit::kPoints && views.points.size() == 0) {
     return Error{ErrorCode::kBadArgument, Cat(project, " has no points for --init points; use --init view or random")};

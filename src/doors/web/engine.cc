@@ -304,7 +304,7 @@ Result<Engine::Answer> Engine::Info(const Json& request) {
   findings.file_bytes = found->bytes;
   Answer answer;
   answer.json = ToJson(findings);
-  answer.json["looks_in_words"] = LooksInWords(findings);
+  answer.json["looks_in_words"] = DescribeProvenance(findings);
   answer.json["treatment_in_words"] = TreatmentInWords(findings);
   return answer;
 }
@@ -350,7 +350,7 @@ Result<Engine::Answer> Engine::Filter(const Json& request) {
   const double upscale = value != nullptr && value->is_number() ? value->get<double>() : 4;
   if (!(upscale >= 1 && upscale <= 1e6)) return BadRequest("says an 'upscale' that is not from 1 to 1000000");
   const GaussianCloud& cloud = open->cloud;
-  const auto reading = HasLostNoWidth(cloud) ? Result<Reading>(Error{}) : Read(cloud);
+  const auto reading = IsMarkedFullWidth(cloud) ? Result<Reading>(Error{}) : Read(cloud);
   const Treatment treatment = reading.ok() ? Treat(*reading, {.mode = cloud.render_mode}) : Treatment{};
   const bool none = treatment.method == TreatmentMethod::kNone;
   const double strength = none ? 0 : DefaultFilterStrength(upscale, treatment.mode);

@@ -35,10 +35,10 @@ bool IsWhole(const std::vector<std::vector<size_t>>& partners, size_t view) {
   return std::ranges::none_of(partners, [view](const auto& partner) { return partner[view] == kNoView; });
 }
 
-// Views that only one side has are left out with a word; kBadArgument where no view is on all sides.
+// Logs views missing on some side. kBadArgument if no view is on all sides.
 Status TellOfMissing(std::span<ViewSource* const> sources, const std::vector<std::vector<size_t>>& partners,
                      const ViewSource& reference) {
-  std::vector<std::string> missing, spare;  // what another side lacks, of the reference's and of the sources'
+  std::vector<std::string> missing, spare;  // of the reference's views, and of the sources'
   const std::vector<std::string> labels = ViewLabels(reference.names());
   for (size_t r = 0; r < labels.size(); ++r) {
     if (!IsWhole(partners, r)) missing.push_back(labels[r]);
@@ -63,7 +63,7 @@ Status TellOfMissing(std::span<ViewSource* const> sources, const std::vector<std
   return {};
 }
 
-// All views whose pictures differ in size, before any of them is made.
+// Reports all views with different picture sizes before rendering any.
 Status CheckSizes(std::span<ViewSource* const> sources, const std::vector<std::vector<size_t>>& partners,
                   const ViewSource& reference) {
   constexpr int kShown = 10;
@@ -73,7 +73,7 @@ Status CheckSizes(std::span<ViewSource* const> sources, const std::vector<std::v
   for (size_t r = 0; r < reference.names().size(); ++r) {
     if (!IsWhole(partners, r)) continue;
     ANCHORSPLAT_ASSIGN_OR_RETURN(const ImageSize truth, reference.SizeOf(r));
-    std::vector<std::string> others;  // each size once
+    std::vector<std::string> others;  // distinct sizes
     for (size_t s = 0; s < sources.size(); ++s) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(const ImageSize size, sources[s]->SizeOf(partners[s][r]));
       if (size.width == truth.width && size.height == truth.height) continue;
@@ -90,9 +90,9 @@ Status CheckSizes(std::span<ViewSource* const> sources, const std::vector<std::v
   return Error{ErrorCode::kBadArgument, Cat("pictures of different sizes: ", list, "; --size sets that of renders")};
 }
 
-// Where either picture says nothing.
+// Union of both masks.
 Buffer<uint8_t> EitherIgnored(const Buffer<uint8_t>& a, const Buffer<uint8_t>& b) {
-  if (a.size() != b.size()) return a.empty() ? b : a;  // pictures of one size: one has no mask
+  if (a.size() != b.size()) return a.empty() ? b : a;  // one picture has no mask
   Buffer<uint8_t> either = a;
   for (size_t i = 0; i < either.size(); ++i) either[i] = a[i] != 0 || b[i] != 0;
   return either;
@@ -111,7 +111,7 @@ Result<CorrectedScore> CorrectColors(Image image, const Image& truth, const Buff
   return score;
 }
 
-// Nothing: the masks leave nothing to compare.
+// Scores a view; unset if fully masked.
 Result<std::optional<ViewScore>> Score(Image image, const Image& truth, const Buffer<uint8_t>& ignored,
                                        const CompareOptions& options) {
   FillIgnored(ignored, truth, image);
@@ -165,7 +165,7 @@ Result<std::vector<Comparison>> CompareToReference(std::span<ViewSource* const> 
     }
     ++count;
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Image truth, reference.Load(r));
-    std::vector<ViewScore> scores;  // of every source
+    std::vector<ViewScore> scores;  // one per source
     for (size_t s = 0; s < sources.size(); ++s) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(Image image, sources[s]->Load(partners[s][r]));
       const Buffer<uint8_t> ignored = EitherIgnored(reference.ignored(), sources[s]->ignored());
@@ -176,7 +176,7 @@ Result<std::vector<Comparison>> CompareToReference(std::span<ViewSource* const> 
       scores.push_back(*std::move(score));
     }
     progress.Advance();
-    if (scores.size() < sources.size()) {  // what one of them cannot say counts for none, so that means compare
+    if (scores.size() < sources.size()) {  // skipped for all sources, so that means are comparable
       masked.push_back(name);
       continue;
     }

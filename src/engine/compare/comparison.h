@@ -12,8 +12,7 @@
 
 namespace anchorsplat {
 
-// How near a picture is to the truth once the affine map of its colours that brings it nearest was applied
-// (metrics/color_correction.h).
+// Scores after the affine colour correction that best matches the truth (metrics/color_correction.h).
 struct CorrectedScore {
   double psnr = 0;
   double ssim = 0;
@@ -21,39 +20,37 @@ struct CorrectedScore {
 };
 
 struct ViewScore {
-  std::string name;  // the view's (ViewLabels in cameras/view_labels.h)
+  std::string name;  // of the view (ViewLabels in cameras/view_labels.h)
   double psnr = 0;   // dB; infinite for identical pictures
   double ssim = 0;
-  std::optional<double> lpips;                // where it was asked for
-  std::optional<CorrectedScore> corrected{};  // likewise
-  size_t reference_view = 0;                  // which of the reference's it is
+  std::optional<double> lpips;                // if requested
+  std::optional<CorrectedScore> corrected{};  // if requested
+  size_t reference_view = 0;                  // index in the reference
 };
 
 struct Comparison {
-  std::vector<ViewScore> views;  // in the reference's order, without those that masks hide
-  double mean_psnr = 0;          // over the views; infinite when one of them is
+  std::vector<ViewScore> views;  // in the reference's order, without fully masked ones
+  double mean_psnr = 0;          // over the views; infinite if one of them is
   double mean_ssim = 0;
   std::optional<double> mean_lpips;
   std::optional<CorrectedScore> mean_corrected;
 };
 
-// What is measured beside PSNR and SSIM.
+// Optional measurements.
 struct CompareOptions {
-  std::function<Result<double>(const Image& picture, const Image& truth)> lpips;  // measures it; none: nobody asks
-  bool color_correct = false;  // of every source to the reference, view by view
+  std::function<Result<double>(const Image& picture, const Image& truth)> lpips;  // measures LPIPS; empty: skipped
+  bool color_correct = false;  // also scores after colour correction, view by view
 };
 
-// Which view of each source shows what view r of the reference shows: [source][r], kNoView for none. Names match as
-// MatchViews says (metrics/compare.h); two single pictures match whatever their names. kBadArgument: a name that
-// appears twice.
+// For each source and reference view r, the source's view of the same: [source][r], or kNoView. Names are matched as in
+// MatchViews (metrics/compare.h); two single pictures always match. kBadArgument: a duplicate name.
 inline constexpr size_t kNoView = static_cast<size_t>(-1);
 Result<std::vector<std::vector<size_t>>> MatchSources(std::span<ViewSource* const> sources,
                                                       const ViewSource& reference);
 
-// PSNR, SSIM and LPIPS of every source against the reference, view by view; one result per source. Pixels that a mask
-// of either leaves out do not count. Views of which nothing is left, and those that one of the sources or the reference
-// lacks, are in no result, which a warning says. Errors: pictures of different sizes, which are named; nothing is left
-// of any view. Shows progress.
+// Compares every source with the reference view by view: PSNR, SSIM and optionally LPIPS; one result per source. Pixels
+// masked in either do not count. Fully masked views, and those that the reference or a source lacks, are left out with
+// a warning. Errors: pictures of different sizes (named); all views fully masked. Shows progress.
 Result<std::vector<Comparison>> CompareToReference(std::span<ViewSource* const> sources, ViewSource& reference,
                                                    const CompareOptions& options = {});
 

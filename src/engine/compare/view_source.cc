@@ -62,7 +62,7 @@ class SplatViewSource : public ViewSource {
   ConstantCloud still_{cloud_};
   CameraSet cameras_;
   RenderOptions options_;
-  bool warned_ = false;  // of a view with nothing in it: one is enough
+  bool warned_ = false;  // of an empty view; once is enough
   Rasterizer rasterizer_;
   RenderOutput output_;
   std::vector<std::string> names_;
@@ -70,7 +70,7 @@ class SplatViewSource : public ViewSource {
 
 class ImageViews : public ViewSource {
  public:
-  // A file, and the camera whose picture it is; one without pixels where none is known.
+  // A file and the camera it belongs to; a camera without pixels if unknown.
   struct View {
     fs::path file;
     Camera camera;
@@ -113,14 +113,14 @@ class ImageViews : public ViewSource {
   Buffer<uint8_t> ignored_;
 };
 
-// One spelling for a file, however it was reached.
+// Canonical path of a file, however it was reached.
 std::string PlaceOf(const fs::path& file) {
   std::error_code code;
   const fs::path place = fs::weakly_canonical(file, code);
   return code ? file.lexically_normal().string() : place.string();
 }
 
-// A folder's pictures, and those of the cameras in folders inside it.
+// A folder's pictures, and those of the cameras in subfolders.
 Result<std::vector<fs::path>> PicturesIn(const fs::path& folder, const CameraSet& cameras) {
   auto files = ListPictures(folder);
   const std::string inside = PlaceOf(folder) + "/";
@@ -191,11 +191,11 @@ Result<std::unique_ptr<ViewSource>> OpenImageViews(const fs::path& path, const s
     view.camera = *owner->second;
     ANCHORSPLAT_RETURN_IF_ERROR(MatchPhotograph(view.camera));
   }
-  // Depth maps and other pictures beside those that the cameras name are nobody's views.
+  // Depth maps and the like beside pictures named by cameras are not views.
   const auto owned = [](const ImageViews::View& view) { return view.camera.intrinsics.width > 0; };
   const auto strangers = static_cast<size_t>(std::ranges::count_if(views, std::not_fn(owned)));
   if (strangers > 0 && strangers < views.size()) {
-    // Those beside the cameras' own have been spoken of when these were looked for.
+    // Pictures beside the cameras' own were already reported when these were opened.
     std::set<fs::path> folders;
     for (const auto& [place, camera] : owners) folders.insert(fs::path(place).parent_path());
     const auto elsewhere = std::ranges::count_if(views, [&](const ImageViews::View& view) {

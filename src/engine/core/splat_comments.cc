@@ -112,7 +112,7 @@ std::string PixelAreaComment(double upscale) { return Cat(kPixelAreaMark, upscal
 
 bool IsFittedToPixelAreas(const CloudView& cloud) { return HasMark(cloud.comments, kPixelAreaMark); }
 
-bool HasLostNoWidth(const CloudView& cloud) {
+bool IsMarkedFullWidth(const CloudView& cloud) {
   return IsFittedToPixelAreas(cloud) || IsMarkedEnhanced(cloud) || IsMarkedPartEnhanced(cloud);
 }
 

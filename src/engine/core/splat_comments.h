@@ -39,7 +39,7 @@ std::string PixelAreaComment(double upscale);
 bool IsFittedToPixelAreas(const CloudView& cloud);
 
 // Whether the splat has any of the three marks, so that it cannot be enhanced as a whole.
-bool HasLostNoWidth(const CloudView& cloud);
+bool IsMarkedFullWidth(const CloudView& cloud);
 
 // Attributions of a splat (author, licence): comments that begin with "credit: ", without that prefix. Licences such as
 // CC BY require them wherever the splat is shown, so pages, pictures and formats with a place for them carry them.

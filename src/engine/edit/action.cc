@@ -63,7 +63,7 @@ std::vector<std::string> Parts(const std::string& text) {
   return parts;
 }
 
-// A finite number and nothing else; "+1" and "1." are some.
+// Parses a finite number and nothing else; accepts "+1" and "1.".
 std::optional<double> Number(std::string text) {
   if (text.starts_with('+') && !text.starts_with("+-")) text.erase(0, 1);
   double value = 0;
@@ -87,11 +87,11 @@ std::optional<std::array<double, kCount>> Numbers(const std::string& text) {
 
 std::string Found(const std::string& text) { return Cat(", found '", Printable(text), "'"); }
 
-// Of a matrix that takes vectors along some axes to RDF.
+// Applies a matrix that converts vectors from some axes to RDF.
 Vec3 Times(const Matrix& m, const Vec3& v) { return Similarity{m, {}, 1}.Apply(v); }
 Matrix Times(const Matrix& a, const Matrix& b) { return Compose({a, {}, 1}, {b, {}, 1}).rotation; }
 
-// Exact for quarters of a turn.
+// Exact for multiples of 90°.
 std::pair<double, double> SineAndCosine(double degrees) {
   const double turn = std::remainder(degrees, 360);
   if (turn == 0) return {0, 1};
@@ -102,7 +102,7 @@ std::pair<double, double> SineAndCosine(double degrees) {
   return {std::sin(radians), std::cos(radians)};
 }
 
-// About x, then y, then z, each of the axes that stand still: Rz·Ry·Rx.
+// Rotates about the fixed axes x, then y, then z: Rz·Ry·Rx.
 Matrix FromEuler(const Vec3& degrees) {
   const auto [sx, cx] = SineAndCosine(degrees[0]);
   const auto [sy, cy] = SineAndCosine(degrees[1]);
@@ -117,7 +117,7 @@ Result<EditAction> Finished(EditAction action, decltype(EditAction::what) what) 
   return action;
 }
 
-// "x", "-z", "+y": an axis and its sign.
+// Parses "x", "-z", "+y": an axis with sign.
 std::optional<Vec3> Axis(std::string text) {
   double sign = 1;
   if (text.size() == 2 && (text[0] == '-' || text[0] == '+')) {
@@ -207,7 +207,7 @@ Result<EditAction> ParseScale(EditAction action, std::string_view name, const st
                    "harmonics",
                    Found(text)));
   }
-  // Floats end there, and so do lengths that are drawn.
+  // Limit of float, and of lengths that can be drawn.
   constexpr double kMost = 1e18;
   if (!factor || !(*factor >= 1 / kMost && *factor <= kMost)) {
     return Bad(name, Cat("expected a factor above 0", factor && *factor < 0 ? "; --mirror mirrors" : "",

@@ -15,49 +15,48 @@
 
 namespace anchorsplat {
 
-// What may be done to a splat, one after the other. Positions, directions and lengths are those of its world, in the
-// axes that a cloud has in memory (RDF).
+// Edits of a splat, applied in order. Positions, directions and lengths are in its world, in memory axes (RDF).
 
-// p ↦ map(p); the rotation may mirror (determinant −1). Translations, rotations, scalings, mirrorings.
+// p ↦ map(p): translation, rotation, scaling, mirroring (determinant −1).
 struct MoveWorld {
   Similarity map;
 };
-// Turns the shortest way so that `up` (a unit vector) becomes the usual up (core/world_up.h), and says so in a comment.
+// Rotates the shortest way so that unit vector `up` becomes the usual up (core/world_up.h), and notes it in a comment.
 struct TurnToUp {
   std::array<double, 3> up;
 };
 
-// Only what lies in the box or on its border stays; with `outside` only the rest does.
+// Keeps only what is in the box or on its border; with `outside`, only the rest.
 struct KeepBox {
   std::array<double, 3> low, high;  // −∞ and +∞: no border
   bool outside = false;
 };
-// Only what is nearer to the centre than the radius stays.
+// Keeps only what is closer to the centre than the radius.
 struct KeepSphere {
   std::array<double, 3> centre;
   double radius;
 };
-// Drops what has a value that is no number, an infinite one but where that has a meaning (an opacity logit of +∞, a
-// log-scale of −∞), or a quaternion of zero.
+// Drops rows with NaN, with an infinity other than the meaningful ones (opacity logit +∞, log-scale −∞), or with a zero
+// quaternion.
 struct KeepNumbers {};
-// Only rows whose property compares so stay. NaN compares with nothing, but is not equal to anything.
+// Keeps only rows whose property satisfies the comparison. NaN satisfies only kNotEqual.
 enum class ValueComparison { kLess, kLessOrEqual, kGreater, kGreaterOrEqual, kEqual, kNotEqual };
 struct KeepByValue {
-  std::string property;  // x, f_dc_0, opacity, scale_2, rot_3, f_rest_44 or another one of the file
+  std::string property;  // x, f_dc_0, opacity, scale_2, rot_3, f_rest_44 or an extra property of the file
   ValueComparison comparison;
-  double value;  // as stored: a logit, a logarithm, a harmonic
-  // Row-major, from the world's axes to those along which x, y, z, rot_* and f_rest_* are meant.
+  double value;  // as stored: logit, logarithm, SH coefficient
+  // Row-major, from world axes to the axes of x, y, z, rot_* and f_rest_*.
   std::array<double, 9> turn = {1, 0, 0, 0, 1, 0, 0, 0, 1};
 };
-// What IsUsable (core/gaussian_cloud.h), of at least this opacity.
+// Keeps only usable rows (IsUsable, core/gaussian_cloud.h) of at least this opacity.
 struct KeepOpaque {
   float least;  // 0–1
 };
-// Harmonics of higher degrees go.
+// Drops SH of higher degrees.
 struct LowerShDegree {
   int most;
 };
-// FindFloaters.
+// Drops what FindFloaters finds.
 struct DropFloaters {
   FloaterOptions options;
 };
@@ -67,24 +66,23 @@ struct EditAction {
   std::variant<MoveWorld, TurnToUp, KeepBox, KeepSphere, KeepNumbers, KeepByValue, KeepOpaque, LowerShDegree,
                DropFloaters>
       what;
-  std::string axes = {};  // along which its numbers are, "LUF"; empty: they are along none
+  std::string axes = {};  // axes of its numbers, "LUF"; empty: not applicable
 };
 
-// Those of the numbers that people type, unless they say others: splat-transform's, for any file.
+// Default axes of numbers that users type: those of splat-transform, for any file.
 inline constexpr std::string_view kTypedActionAxes = "LUF";
 
-// An action as the command line knows it; what `convert --help` shows.
+// An action on the command line, as in `convert --help`.
 struct ActionName {
   std::string_view options;  // "-t,--translate"
   std::string_view name;     // "--translate"
   std::string_view help;
-  std::string_view form;  // of its value; empty: it has none, or may do without
+  std::string_view form;  // form of its value; empty: none, or optional
 };
 std::span<const ActionName> ActionNames();
 
-// The action of that name ("--translate") with a value in words; `text` is empty or "true" where none was given. The
-// numbers are along `axes`, RDF being those that a cloud has in memory. Errors (kBadArgument) name the action and say
-// what is expected.
+// Parses the action `name` ("--translate") with value `text`, empty or "true" if none was given. `axes`: axes of its
+// numbers; kRdf are those in memory. Errors (kBadArgument) name the action and what is expected.
 Result<EditAction> ParseAction(std::string_view name, const std::string& text, const Axes& axes = kRdf);
 
 }  // namespace anchorsplat

@@ -17,7 +17,7 @@ namespace anchorsplat {
 
 namespace {
 
-// The rows of `from` that are kept become row `begin` of `to` and on; harmonics that they have not are zero.
+// Copies the kept rows of `from` to `to` from row `begin`, moved; SH it lacks become zero.
 void CopyMoved(const CloudView& from, const EditedSplat& splat, int64_t begin, GaussianCloud& to) {
   const RowMover mover(splat.world, splat.origin, to.origin, splat.sh_degree);
   const std::vector<int64_t> places = PlacesOfBlocks(splat, begin);

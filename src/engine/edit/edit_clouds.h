@@ -12,7 +12,7 @@
 
 namespace anchorsplat {
 
-// Actions on the splats [first, first + count) of several, as if these were one.
+// Actions on splats [first, first + count), as if they were one.
 struct EditRun {
   size_t first = 0;
   size_t count = 0;
@@ -24,10 +24,10 @@ struct EditedCloud {
   std::vector<EditStep> steps;
 };
 
-// Splats in memory that become one, as EditFiles makes one of files: the runs in their order, then the Gaussians of one
-// splat behind those of the other. `clouds` stay as they are; each row that is left is copied once. The result may have
-// no Gaussians. In messages and reports they are "the cloud", or "cloud 1" and on where there are several.
-// Errors (kBadArgument): arrays that disagree, those of ApplyActions.
+// Edits and merges splats in memory, as EditFiles does with files: applies the runs in order, then concatenates.
+// `clouds` are unchanged; each remaining row is copied once. The result may be empty. Messages call the splats "the
+// cloud", or "cloud 1", … if there are several.
+// Errors (kBadArgument): arrays of different lengths; those of ApplyActions.
 Result<EditedCloud> EditClouds(std::span<const CloudView> clouds, std::span<const EditRun> runs);
 
 }  // namespace anchorsplat

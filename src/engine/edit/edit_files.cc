@@ -24,7 +24,7 @@ namespace anchorsplat {
 
 namespace {
 
-// A splat in memory as its actions leave it, with its origin where the result's is.
+// Applies a splat's edits in memory and makes it relative to the result's origin.
 void Finish(const EditedSplat& edited, const WorldOrigin& origin, ConvertedSplat& splat) {
   if (!edited.keep.empty()) KeepRows(splat.cloud, &splat.extras, edited.keep);
   SetShDegree(splat.cloud, edited.sh_degree);
@@ -37,7 +37,7 @@ void Finish(const EditedSplat& edited, const WorldOrigin& origin, ConvertedSplat
   splat.cloud.origin = origin;
 }
 
-// The first splat with the others behind it.
+// Appends the other splats to the first.
 Status Merge(std::vector<ConvertedSplat>& splats, ConvertedSplat& all) {
   std::vector<std::optional<RenderMode>> modes;
   std::vector<const ExtraProperties*> extras;

@@ -23,8 +23,8 @@ namespace {
 
 using Vec3 = std::array<double, 3>;
 
-// The rotation by the smallest angle that takes the unit vector `from` to `to` (Rodrigues); of opposite ones a half
-// turn about an axis across.
+// The smallest rotation that takes unit vector `from` to `to` (Rodrigues); for opposite vectors, a half turn about a
+// perpendicular axis.
 std::array<double, 9> ShortestTurn(const Vec3& from, const Vec3& to) {
   const double cosine = Dot(from, to);
   if (cosine <= -1 + 1e-12) {
@@ -50,7 +50,7 @@ void Move(const Similarity& map, EditedSplat& splat) {
   if (map.rotation != Similarity{}.rotation) TurnUpComments(map.rotation, splat.comments);
 }
 
-// What an action does to a splat as a whole.
+// The part of an action that concerns the splat as a whole.
 void ApplyToWhole(const EditAction& action, EditedSplat& splat) {
   if (const auto* const move = std::get_if<MoveWorld>(&action.what)) Move(move->map, splat);
   if (const auto* const turn = std::get_if<TurnToUp>(&action.what)) {
@@ -62,7 +62,7 @@ void ApplyToWhole(const EditAction& action, EditedSplat& splat) {
   }
 }
 
-// Goes through the rows of a splat once. taken[k] grows by what actions[k] takes away.
+// Passes over a splat's rows once; adds to taken[k] what actions[k] removes.
 Status TakeAway(EditedSplat& splat, std::span<const EditAction> actions, std::span<int64_t> taken) {
   std::vector<std::pair<size_t, RowTest>> tests;
   for (size_t k = 0; k < actions.size(); ++k) {
@@ -95,11 +95,11 @@ Status TakeAway(EditedSplat& splat, std::span<const EditAction> actions, std::sp
   return {};
 }
 
-// Takes the floaters of all splats together. Distances do not depend on where a splat is, so means are taken from where
-// the first one's origin has got to.
+// Finds the floaters of all splats together. Distances do not depend on position, so means are relative to where the
+// first splat's origin is now.
 Result<int64_t> TakeFloaters(std::span<EditedSplat> splats, const FloaterOptions& options) {
   const Vec3 middle = splats[0].world.Apply(splats[0].origin);
-  // Where the rows of each splat begin among those that are kept and can be placed.
+  // Start of each splat's rows among those that are kept and have a finite position.
   constexpr uint32_t kNone = UINT32_MAX;
   int64_t most = 0;
   for (const EditedSplat& splat : splats) most += splat.kept;
@@ -133,7 +133,7 @@ Result<int64_t> TakeFloaters(std::span<EditedSplat> splats, const FloaterOptions
       }
     }));
   }
-  // What cannot be drawn has no neighbours.
+  // Undrawable Gaussians are nobody's neighbours.
   std::vector<uint32_t> closed(static_cast<size_t>(most), kNone);
   uint32_t count = 0;
   for (size_t i = 0; i < closed.size(); ++i) {
@@ -228,8 +228,8 @@ Result<WorldOrigin> ChooseEditedOrigin(std::span<const EditedSplat> splats) {
     }
   }
   if (lengths.empty()) return WorldOrigin{};
-  // Other programs know of no origin: there is one only where floats would be off by more than a sixteenth of a typical
-  // length, not by a 512th as for a file that has doubles.
+  // Other programs ignore origins, so one is chosen only if floats are off by more than a sixteenth of a typical
+  // length; for files with doubles the limit is a 512th.
   constexpr double kCoarser = 32;
   return ChooseOrigin(points, kCoarser * std::exp(double{Quantile(lengths, 0.5)}));
 }

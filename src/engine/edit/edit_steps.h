@@ -9,23 +9,23 @@
 
 namespace anchorsplat {
 
-// What both ways of EditFiles do alike.
+// Shared by both implementations of EditFiles.
 
-// Each input's actions on it, then those on all, with what ConvertOptions ask for behind them. `splats` are as their
-// files have them. Errors: those of ApplyActions; kBadArgument where nothing is left.
+// Applies each input's actions, then those on all, then what ConvertOptions request. `splats`: as read. Errors: those
+// of ApplyActions; kBadArgument: nothing is left.
 Result<std::vector<EditStep>> ApplyJob(const EditJob& job, std::span<EditedSplat> splats);
 
-// Where in a result whose row `begin` is the splat's first one the rows that are kept begin, of each kRowsPerBlock rows
-// of the splat; then where they end.
+// Output rows at which the kept rows of each block of kRowsPerBlock start, and the final end, if the splat starts at
+// output row `begin`.
 std::vector<int64_t> PlacesOfBlocks(const EditedSplat& splat, int64_t begin);
 
-// Drops comments that hold only where a splat was before. Called once all actions are applied.
+// Drops comments that refer to the splat's former position. Call after all actions.
 void DropPlaces(std::span<EditedSplat> splats);
 
-// Says how many Gaussians of the result nobody draws.
+// Warns how many Gaussians of the result no renderer draws.
 void WarnOfUndrawn(const std::filesystem::path& output, int64_t undrawn, int64_t gaussians);
 
-// Seconds from some time on.
+// Seconds since an arbitrary time.
 double SecondsNow();
 
 }  // namespace anchorsplat

@@ -44,7 +44,7 @@ class PlyRowSource final : public RowSource {
   const PlyInput& input_;
 };
 
-// As OpenedSplat::Read is followed by it, on rows from all over the file.
+// Warnings that follow OpenedSplat::Read, from a sample of rows over the whole file.
 Status WarnOfStoredRows(const std::string& name, const PlyInput& input) {
   constexpr int64_t kRuns = 64, kRun = 256;
   GaussianCloud sample, rows;
@@ -65,7 +65,7 @@ Status WarnOfStoredRows(const std::string& name, const PlyInput& input) {
   return {};
 }
 
-// What is the same for all blocks of the output.
+// What all blocks of the output share.
 struct Writing {
   const PlyOutput& file;
   const CloudView& head;
@@ -74,7 +74,7 @@ struct Writing {
   std::atomic<int64_t> undrawn = 0;
 };
 
-// Rows [first, last) of an input, of which those that are kept become row `to` of the output and on.
+// Edits rows [first, last) of an input and writes the kept ones from row `to` of the output.
 Status WriteBlock(const PlyInput& input, const EditedSplat& splat, const RowMover& mover, int64_t first, int64_t last,
                   int64_t to, Writing& writing) {
   GaussianCloud rows;
@@ -109,7 +109,7 @@ Status WriteRows(const PlyInput& input, const EditedSplat& splat, const RowMover
   return failure.status();
 }
 
-// What the result is like, without rows.
+// The result without rows.
 Result<GaussianCloud> HeadOf(const EditJob& job, const std::vector<PlyInput>& inputs, std::span<EditedSplat> splats) {
   GaussianCloud head;
   std::vector<std::optional<RenderMode>> modes;

@@ -10,9 +10,10 @@
 
 namespace anchorsplat {
 
-// EditFiles for binary PLYs that become a PLY, block by block: a byte for each Gaussian, and some megabytes a thread.
+// EditFiles for binary PLYs that become a PLY, block by block. Memory: a byte per Gaussian and some megabytes per
+// thread.
 
-// The inputs, where all of them can be read and the job done so; else none.
+// The inputs if the whole job can be streamed, else none.
 Result<std::vector<PlyInput>> StreamableInputs(const EditJob& job, const std::filesystem::path& output,
                                                const std::vector<OpenedSplat>& files, bool kept);
 

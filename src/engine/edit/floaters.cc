@@ -16,8 +16,8 @@ constexpr size_t kFourth = 4;
 constexpr double kLeastApart = 3, kSpread = 1.6, kSpreadPower = 2.5, kLengths = 0.4, kLengthsPower = 0.6;
 constexpr int64_t kPlacesPerTask = 4096;
 
-// Reorders them. Of those that are above 0: copies of one place, as broken files have thousands, say nothing of how far
-// the others are apart.
+// Quantile of the positive values; reorders them. Exact duplicates, of which broken files have thousands, say nothing
+// about spacing.
 double QuantileAboveZero(Buffer<float>& values, double q) {
   const auto end = std::partition(values.begin(), values.end(), [](float x) { return x > 0; });
   return double{Quantile(std::span(values).first(static_cast<size_t>(end - values.begin())), q)};
@@ -45,7 +45,7 @@ Buffer<uint8_t> FindFloaters(std::span<const float> places, std::span<const floa
   Buffer<float> values = apart;
   const double median = QuantileAboveZero(values, 0.5), quartile = QuantileAboveZero(values, 0.75);
   if (!(median > 0)) return floats;
-  const auto ratio = [&](size_t i) { return apart[i] / lengths[i]; };  // ∞ of a point
+  const auto ratio = [&](size_t i) { return apart[i] / lengths[i]; };  // ∞ for a point
   for (size_t i = 0; i < values.size(); ++i) values[i] = ratio(i);
   const double typical = QuantileAboveZero(values, 0.5);
   const double least = options.factor * std::max(kLeastApart, kSpread * std::pow(quartile / median, kSpreadPower));

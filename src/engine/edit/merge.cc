@@ -17,7 +17,7 @@ bool Has(const std::vector<std::string>& comments, const std::string& comment) {
   return std::ranges::find(comments, comment) != comments.end();
 }
 
-// "enhanced by anchorsplat: model, 4 times closer" as what a part of a splat has.
+// Turns "enhanced by anchorsplat: model, 4 times closer" into the mark of a partly enhanced splat.
 std::string OfAPart(const std::string& mark) {
   for (const std::string_view whole : {kEnhancedMark, kPixelAreaMark}) {
     if (!mark.starts_with(whole)) continue;

@@ -11,21 +11,21 @@
 
 namespace anchorsplat {
 
-// What several splats that become one say together. All of it is said in warnings where something is lost.
+// Metadata of merged splats. Losses are warned about.
 
-// Comments of all, each once. Where up is, is what the first one says that says it; what they were trained over counts
-// where all agree. Marks (core/splat_comments.h) that not all have become those of a part.
+// Comments of all, each once. The first splat that states up decides it; training backgrounds count only if all agree.
+// Marks (core/splat_comments.h) that not all have become those of a part.
 std::vector<std::string> MergedComments(std::span<const EditedSplat> splats);
 
-// That of all; nothing where they differ.
+// The common render mode; unset if they differ.
 std::optional<RenderMode> MergedMode(std::span<const std::optional<RenderMode>> modes);
 
-// Without rows: the properties, in the order of the first one, that all have of the same type; normals where any has.
-// What is left out is named in `not_kept`.
+// Properties (without rows) that all have with the same type, in the first one's order; normals if any has them. Those
+// left out go to `not_kept`.
 ExtraProperties MergedProperties(std::span<const ExtraProperties* const> extras);
 
-// `rows` [first, last) of a splat behind those of `to`, whose properties are some of theirs: normals that are missing
-// are zero. `gaussians`: how many `to` has.
+// Appends `rows` [first, last) of a splat to `to`, which has a subset of its properties; missing normals become zero.
+// `gaussians`: current size of `to`.
 void AppendExtras(const ExtraProperties& rows, int64_t first, int64_t last, int64_t gaussians, bool has_normals,
                   ExtraProperties& to);
 

@@ -57,7 +57,7 @@ void RowMover::Move(GaussianCloud& rows, int64_t first, int64_t last) const {
   }
 }
 
-// a ⊗ b, wxyz: first the rotation b, then a. The zero quaternion is no rotation (core/rotation.h).
+// Replaces b by a ⊗ b (wxyz): rotation b, then a. The zero quaternion counts as no rotation (core/rotation.h).
 void RowMover::TurnQuaternion(float* q) const {
   const std::array<double, 4>& a = quat_;
   std::array<double, 4> b = {q[0], q[1], q[2], q[3]};
@@ -77,7 +77,7 @@ void RowMover::Move(ExtraProperties& extras, int64_t first, int64_t last) const 
   const Similarity turn = {world_.rotation, {}, 1};
   for (int64_t i = first; i < last && !extras.normals.empty() && turns_; ++i) {
     float* normal = extras.normals.data() + 3 * i;
-    if (normal[0] == 0 && normal[1] == 0 && normal[2] == 0) continue;  // none, and no negative zeros of it
+    if (normal[0] == 0 && normal[1] == 0 && normal[2] == 0) continue;  // absent; avoids negative zeros
     const std::array<double, 3> turned = turn.Apply({normal[0], normal[1], normal[2]});
     for (size_t k = 0; k < 3; ++k) normal[k] = static_cast<float>(turned[k]);
   }

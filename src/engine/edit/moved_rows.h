@@ -12,24 +12,23 @@
 
 namespace anchorsplat {
 
-// What becomes of Gaussians where their world moves: p ↦ s·M·p + t, M orthogonal. Means go along. A covariance
-// R S² Rᵀ becomes s²·M R S² Rᵀ Mᵀ, which is that of the rotation det(M)·M·R and the lengths s·S, as −1 cancels out. A
-// colour that was seen along d is now seen along M·d: core/sh_rotation.h. Normals become M·n.
+// Applies p ↦ s·M·p + t (M orthogonal) to Gaussians. Means follow it. Covariance R S² Rᵀ becomes s²·M R S² Rᵀ Mᵀ, that
+// of rotation det(M)·M·R and lengths s·S, as −1 cancels. A colour seen along d is now seen along M·d
+// (core/sh_rotation.h). Normals become M·n.
 //
-// Calculated in double and rounded once. Rows of which nothing changes keep their bits, and so does a row's quaternion
-// and its harmonics where M is the identity.
+// Computes in double and rounds once. Unchanged rows keep their bits; if M is the identity, so do quaternions and SH.
 class RowMover {
  public:
-  // `from`: origin of the rows that come; `to`: of those that they become.
+  // `from`: origin of the input rows; `to`: of the output rows.
   RowMover(const Similarity& world, const WorldOrigin& from, const WorldOrigin& to, int sh_degree);
 
   bool changes_nothing() const { return !turns_ && !scales_ && !shifts_; }
-  // Rows [first, last) in place. Harmonics above the SH degree of the constructor stay.
+  // Moves rows [first, last) in place. SH above the constructor's degree stay.
   void Move(GaussianCloud& rows, int64_t first, int64_t last) const;
   void Move(ExtraProperties& extras, int64_t first, int64_t last) const;
 
   bool turns() const { return turns_; }
-  // Of one row, where turns(): its quaternion, wxyz, and its harmonics [K,3] of some degree, in place.
+  // Rotates a quaternion (wxyz) or SH [K,3] of any degree in place. Require turns().
   void TurnQuaternion(float* quat) const;
   void TurnHarmonics(float* sh, int degree) const;
 

@@ -10,17 +10,17 @@
 
 namespace anchorsplat {
 
-// Neighbouring rows of a splat with all that is known of them. Valid during a call.
+// Consecutive rows of a splat with all their data. Valid during a call.
 struct RowBlock {
-  int64_t first = 0;                        // the row of the splat that is row 0 here
-  CloudView rows;                           // of the splat's SH degree, means from its origin on
-  const ExtraProperties* extras = nullptr;  // has row `extra_first` + i for row i
+  int64_t first = 0;                        // splat row of row 0
+  CloudView rows;                           // of the splat's SH degree; means relative to its origin
+  const ExtraProperties* extras = nullptr;  // its row `extra_first` + i belongs to row i
   int64_t extra_first = 0;
   int64_t size() const { return rows.size(); }
 };
 
-// A splat to look at block by block as often as needed, in memory or in a file that is larger than memory. What comes
-// of the rows does not depend on how they are cut into blocks.
+// A splat to be read block by block, repeatedly, from memory or from a file larger than memory. Results must not depend
+// on the division into blocks.
 class RowSource {
  public:
   virtual ~RowSource() = default;
@@ -28,10 +28,10 @@ class RowSource {
   RowSource& operator=(const RowSource&) = delete;
 
   virtual int64_t size() const = 0;
-  // Calls `look` with every block once, from several threads in any order. Errors: of reading.
+  // Calls `look` once per block, from several threads, in any order. Errors: those of reading.
   using Look = std::function<void(const RowBlock&)>;
   virtual Status ForEach(const Look& look) = 0;
-  // The same with the rows [first, last) as one block, on this thread.
+  // Calls it with rows [first, last) as one block, on this thread.
   virtual Status Show(int64_t first, int64_t last, const Look& look) = 0;
 
  protected:
@@ -40,10 +40,10 @@ class RowSource {
 
 inline constexpr int64_t kRowsPerBlock = 2048;
 
-// Rows [first, last) of columns.
+// Rows [first, last) as a view.
 CloudView RowsOf(const CloudView& cloud, int64_t first, int64_t last);
 
-// Of columns in memory, which must stay where they are.
+// Rows in memory, which must outlive this object.
 class MemoryRows final : public RowSource {
  public:
   MemoryRows(const CloudView& cloud, const ExtraProperties& extras) : cloud_(cloud), extras_(extras) {}

@@ -91,7 +91,7 @@ bool Holds(ValueComparison comparison, double a, double b) {
   return false;
 }
 
-// "f_rest_12" behind "f_rest_" is 12; nothing for what is not in `count`.
+// Index after a prefix: 12 for "f_rest_12" with `before` "f_rest_"; unset if not below `count`.
 std::optional<int64_t> IndexIn(std::string_view name, std::string_view before, int64_t count) {
   if (!name.starts_with(before)) return std::nullopt;
   name.remove_prefix(before.size());
@@ -135,7 +135,7 @@ Result<std::optional<RowTest>> RowTest::Of(const EditAction& action, const Simil
     test.column_ = Column::kRotation;
     test.component_ = *rotation;
   } else if (const auto harmonic = IndexIn(name, "f_rest_", harmonics)) {
-    test.column_ = Column::kHarmonic;  // channel by channel in a file
+    test.column_ = Column::kHarmonic;  // channel-major in a file
     const int64_t each = harmonics / 3;
     test.component_ = 3 * (1 + *harmonic % each) + *harmonic / each;
   } else {

@@ -12,12 +12,11 @@
 
 namespace anchorsplat {
 
-// An action that keeps some rows, as it is asked of rows whose world has moved meanwhile.
+// The per-row test of a removing action, applicable to rows whose world has since moved.
 class RowTest {
  public:
-  // Nothing: the action takes no rows away, or looks at more than one at a time. `world`: from the rows' world to the
-  // one in which the action is meant; `extras`: the properties that the splat has. kBadArgument: the property to
-  // compare is none of it.
+  // Makes the test. Unset if the action removes no rows, or judges more than one at a time. `world`: from the rows'
+  // world to the action's. `extras`: the splat's properties. kBadArgument: the splat lacks the property.
   static Result<std::optional<RowTest>> Of(const EditAction& action, const Similarity& world, const WorldOrigin& origin,
                                            int sh_degree, const ExtraProperties& extras);
 
@@ -28,14 +27,14 @@ class RowTest {
   double ValueOf(const RowBlock& block, int64_t i) const;
 
   decltype(EditAction::what) what_;
-  Similarity world_;  // for KeepByValue along its axes
+  Similarity world_;  // for KeepByValue, to its axes
   WorldOrigin origin_ = {0, 0, 0};
   int sh_degree_ = 0;
-  // KeepByValue: the column that it is of.
+  // KeepByValue: the column to compare.
   enum class Column { kPosition, kScale, kOpacity, kColor, kRotation, kHarmonic, kExtra } column_ = Column::kPosition;
-  int64_t component_ = 0;  // of the column's row: bytes of kExtra
+  int64_t component_ = 0;  // index in the column's row; for kExtra in bytes
   PlyType type_ = PlyType::kFloat;
-  std::optional<RowMover> mover_;  // of kRotation and kHarmonic, where these turn
+  std::optional<RowMover> mover_;  // for kRotation and kHarmonic, if they rotate
 };
 
 }  // namespace anchorsplat

@@ -17,26 +17,26 @@ namespace {
 using Vector = std::array<double, 3>;
 
 constexpr size_t kLeastCameras = 8;
-constexpr float kMostDistant = 1.6f;  // farthest camera (95 % of them) over nearest (5 %); likewise of their pixels
-constexpr float kMostAside = 0.2f;    // of the distance, between an axis and the point (90 % of the axes)
+constexpr float kMostDistant =
+    1.6f;  // distance of the farthest (95 %) over the nearest (5 %) camera; likewise for pixels
+constexpr float kMostAside = 0.2f;  // miss distance of an axis (90 % of them) over the distance from the point
 constexpr double kLeastInFront = 0.95;
-// Length of the mean direction to the cameras: 0 all around, ½ for an upper half or a ring at 30°, 1 for one place.
+// Length of the mean direction to the cameras: 0 all around, ½ for a hemisphere or a ring at 30°, 1 for a single place.
 constexpr double kMostOneSided = 0.85;
-// Share of the visible Gaussians that must lie nearer to the point than this part of the cameras' distance: pixels on
-// the side that a camera stands at are half as large as in the middle there, and the median is of those, too, that look
-// from behind.
+// Share of the visible Gaussians that must be closer to the point than kInside of the cameras' distance. Beyond that,
+// pixels on the near side are half as large as at the centre, and the median also covers views from behind.
 constexpr double kLeastInside = 0.9, kInside = 0.5;
 constexpr float kVisibleLogit = -2.2f;  // opacity 0.1
 
 double Norm(const Vector& a) { return std::sqrt(Dot(a, a)); }
 
-// The axis of a view: the third row of the rotation.
+// Viewing direction: third row of the rotation.
 Vector AxisOf(const Camera& camera) {
   const auto& r = camera.world_to_camera.rotation;
   return {r[6], r[7], r[8]};
 }
 
-// The point with the least sum of squared distances to all axes; nothing where they are (nearly) parallel.
+// The point with the smallest sum of squared distances to all axes; unset if they are (nearly) parallel.
 std::optional<Vector> NearestToAxes(const std::vector<Camera>& cameras) {
   std::array<Vector, 3> m{};  // Σ (I − d dᵀ)
   Vector b{};                 // Σ (I − d dᵀ) c
@@ -89,7 +89,7 @@ CameraRuleChoice ChooseCameraRule(const GaussianCloud& cloud, const CameraSet& s
     return smallest(Cat("some cameras stand ", Fixed(far / near, 1), " times closer to the subject than others"));
   }
 
-  // Others may be zoomed in from where they stand.
+  // Zoom may vary at the same distance.
   const float finest = Quantile(pixels, 0.05), coarsest = Quantile(pixels, 0.95);
   if (coarsest > kMostDistant * finest) {
     return smallest(

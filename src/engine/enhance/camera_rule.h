@@ -8,10 +8,9 @@
 
 namespace anchorsplat {
 
-// Which of the two rules suits these cameras: the median where they look at one thing from all around, the smallest
-// otherwise, as it never blurs. All of this has to hold for the median: the axes meet near one point in front of the
-// cameras, from which they stand equally far and see it in pixels of one size, on more than one side, and the splat
-// lies between them, not around them.
+// Chooses the pixel rule for these cameras: the median if they look at one object from all around, else the smallest,
+// which never blurs. The median requires all of: axes meet near one point in front of the cameras; cameras are equally
+// far from it, with equal pixel sizes, on more than one side; the splat lies between them, not around them.
 struct CameraRuleChoice {
   CameraPixelRule rule = CameraPixelRule::kSmallest;
   std::string why;  // the end of a sentence: "the cameras look at one thing from all around"

@@ -28,24 +28,24 @@ namespace anchorsplat {
 
 namespace {
 
-// Nearer than that a network takes something from what the filter has: 0.2 dB at 1.1, 0.3 at 1.2.
+// Closer views than this lose with a network against the filter: 0.2 dB at 1.1, 0.3 at 1.2.
 constexpr double kLeastUpscaleOfNetworks = 1.35;
-// Cameras whose pixels are so many times larger than those of the splat, at 99 % certainty, are not its own.
+// Cameras do not belong to the splat if their pixels are this many times larger than its own, with 99 % certainty.
 constexpr double kFarOff = 2;
-// Half an interval of 99 % on one side over half of one of 80 % on both, of a Laplace distribution: ln 50 / ln 5.
+// One-sided 99 % over two-sided 80 % half-interval of a Laplace distribution: ln 50 / ln 5.
 constexpr double kCertain = 2.43;
-// Things of which more cannot be read one by one.
+// With more components, they are not read one by one.
 constexpr size_t kMostParts = 12;
-// Of the pixel of the whole: gives no width that anybody sees.
+// Relative to the whole splat's pixel: too small to add visible width.
 constexpr double kNextToNothing = 0.02;
 
 bool ShowsNothing(const GaussianCloud& cloud) {
   return std::ranges::none_of(cloud.opacity_logits, [](float logit) { return Sigmoid(logit) >= kMinAlpha; });
 }
 
-// The splat of which cameras or the caller say the pixel, or of which it is read.
+// Pixel sizes from cameras or the caller, before any reading.
 struct KnownPixels {
-  Buffer<float> sizes;          // one or [N]; empty: they are read
+  Buffer<float> sizes;          // one or [N]; empty: to be read off the splat
   std::optional<double> pixel;  // their median
 };
 
@@ -85,7 +85,7 @@ Result<CameraPixelSizes> PixelsOfCameras(const EnhanceOptions& options, const En
   return sizes;
 }
 
-// The one test of cameras: whether the splat says, with certainty, that its pixels were far smaller.
+// The only check of cameras: whether the splat's own pixels were certainly far smaller than theirs.
 bool AreFarOff(double median, const Result<Reading>& reading) {
   if (!reading.ok() || reading->strangeness > 1) return false;
   const double half = std::log(reading->high / reading->pixel);
@@ -108,7 +108,7 @@ Result<KnownPixels> PixelsFrom(const EnhanceOptions& options, bool said, const R
   return known;
 }
 
-// What the caller knows of its pixels.
+// Pixel sizes known before the reading.
 Result<KnownPixels> FindKnownPixels(const EnhanceOptions& options, bool with_pictures, bool said,
                                     const Result<Reading>& reading, const EnhanceInput& input, EnhanceReport& report) {
   if (options.cameras) {
@@ -119,7 +119,7 @@ Result<KnownPixels> FindKnownPixels(const EnhanceOptions& options, bool with_pic
     report.pixel_size_source = PixelSizeSource::kGiven;
     return KnownPixels{{static_cast<float>(*options.pixel_size)}, options.pixel_size};
   }
-  if (with_pictures) {  // they come with the cameras that took them, and are as large as they were in training
+  if (with_pictures) {  // their cameras took them, at the size used in training
     ANCHORSPLAT_ASSIGN_OR_RETURN(
         TrainingViews project,
         OpenProject(options.refine.images,
@@ -148,13 +148,13 @@ Status CheckPixelOptions(const EnhanceOptions& options) {
   return {};
 }
 
-// Outlines of what has been enhanced say nothing about the pixels of the rest.
+// Reads the region's Gaussians; outlines of already enhanced ones say nothing about the others' pixels.
 Result<Reading> ReadInside(const Region& region, const GaussianCloud& cloud, const ReadingModel& model) {
   std::vector<int64_t> inside;
   for (int64_t i = 0; i < cloud.size(); ++i) {
     if (region.Contains(cloud.means.data() + 3 * i)) inside.push_back(i);
   }
-  if (inside.empty()) return Read(cloud, model);  // which is refused later on
+  if (inside.empty()) return Read(cloud, model);  // an empty region is rejected later
   ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud part, Subset(cloud, inside));
   return Read(part, model);
 }
@@ -163,14 +163,13 @@ bool HasNetwork(const MethodPlan& plan) {
   return plan.method->adds_detail || (plan.start != nullptr && plan.start->adds_detail);
 }
 
-// Things that lie apart, as of merged splats, may each have a training of their own: each is read by itself. Nothing
-// where all is one.
+// Reads each component by itself, as merged splats may come from several trainings. Does nothing if there is only one.
 void ReadParts(const MethodPlan& plan, TreatmentRequest request, const Treatment& of_whole, const ReadingModel& model,
                EnhanceInput& input, EnhanceReport& report) {
   const CloudComponents components = FindComponents(input.cloud);
   if (components.component.empty() || components.count < 2 || static_cast<size_t>(components.count) > kMostParts)
     return;
-  std::vector<std::vector<int64_t>> rows(static_cast<size_t>(components.count) + 1);  // at last what is no part
+  std::vector<std::vector<int64_t>> rows(static_cast<size_t>(components.count) + 1);  // the last: in no component
   for (int64_t i = 0; i < input.cloud.size(); ++i) {
     const int32_t part = components.component[static_cast<size_t>(i)];
     rows[part < 0 ? rows.size() - 1 : static_cast<size_t>(part)].push_back(i);
@@ -207,7 +206,7 @@ void ReadParts(const MethodPlan& plan, TreatmentRequest request, const Treatment
   LogInfo(Cat("found ", components.count, " separate parts; each gets its own pixel size"));
 }
 
-// What cameras saw from near has smaller pixels than what they saw from afar.
+// Pixel sizes per place: parts seen from near have smaller pixels than parts seen from afar.
 void ReadPlaces(const ReadingModel& model, EnhanceInput& input, EnhanceReport& report) {
   Buffer<float> ratios = PixelRatios(input.cloud, model);
   if (ratios.empty()) return;
@@ -249,7 +248,7 @@ void SayNothingIsDone(const EnhanceOptions& options, const EnhanceReport& report
 
 void SayWhatIsTaken(const Treatment& treatment, const EnhanceReport& report) {
   const Reading& reading = *report.reading;
-  std::string text = Cat("looks like ", LooksInWords(reading));
+  std::string text = Cat("looks like ", DescribeProvenance(reading));
   if (report.pixel_size_source == PixelSizeSource::kRead) {
     text += Cat("; training pixel estimated at ", reading.pixel, " (", reading.low, " to ", reading.high, "), using ",
                 treatment.pixel, treatment.gain > 0 ? " for the best expected result" : " to be safe",
@@ -270,7 +269,7 @@ void LeaveNetworkOut(const EnhanceOptions& options, MethodPlan& plan) {
   if (plan.method->adds_detail) plan.method = &FilterMethod();
 }
 
-// What the file itself says; empty: nothing.
+// What the file itself says about lost width; empty: nothing.
 std::string_view LostNothing(const GaussianCloud& cloud) {
   if (IsFittedToPixelAreas(cloud)) return "its comments say it was fitted with --pixel area and needs no sharpening";
   if (IsMarkedEnhanced(cloud)) return "its comments say it is already enhanced";
@@ -293,7 +292,7 @@ Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceI
   const bool closer = options.upscale > 1;
   const bool said = options.mode.has_value() || options.filter_strength.has_value();
   const std::string_view lost_nothing = options.filter_strength ? "" : LostNothing(cloud);
-  const bool stays = closer && !plan.method->invents;  // where there is no width to give back
+  const bool stays = closer && !plan.method->invents;  // unchanged if there is no width to restore
   if (!lost_nothing.empty() && stays) {
     SayTheSplatStays(options, Cat(lost_nothing, ". --filter-strength F enhances it anyway"));
   }
@@ -302,7 +301,7 @@ Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceI
   const auto reading = part_alone ? ReadInside(*options.region, cloud, model) : Read(cloud, model);
   if (reading.ok()) {
     report.reading = *reading;
-    input.showing = reading->showing;
+    input.visible_share = reading->visible_share;
   }
   const bool with_pictures = plan.method->takes_start && !options.refine.images.empty();
   ANCHORSPLAT_ASSIGN_OR_RETURN(KnownPixels known,
@@ -316,11 +315,11 @@ Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceI
 
   const bool auto_chosen = !plan.chosen_by.empty();
   TreatmentRequest request{.mode = cloud.render_mode,
-                           .mode_is_said = said,
+                           .mode_is_given = said,
                            .pixel = known.pixel,
                            .filter = auto_chosen || !HasNetwork(plan),
                            .network = HasNetwork(plan)};
-  // A strength is one of a splat as its file says it is.
+  // A given strength refers to the render mode in the file.
   if (options.filter_strength) request.mode = cloud.render_mode.value_or(RenderMode::kClassic);
   if (auto_chosen && options.upscale < kLeastUpscaleOfNetworks) request.network = false;
   Treatment treatment;
@@ -328,7 +327,7 @@ Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceI
     treatment.pixel = known.pixel.value_or(reading.ok() ? reading->pixel : 0);
   } else if (reading.ok() && !(known.pixel && reading->strangeness > 1)) {
     treatment = Treat(*reading, request);
-  } else {  // too few to read, or like nothing that was learned from: who knows its pixels is believed
+  } else {  // unreadable, or unlike the training set: a given pixel is believed
     treatment = {.method = request.network ? TreatmentMethod::kNetwork : TreatmentMethod::kFilter,
                  .mode = cloud.render_mode.value_or(RenderMode::kClassic),
                  .pixel = *known.pixel};

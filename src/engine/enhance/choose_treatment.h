@@ -4,11 +4,12 @@
 
 namespace anchorsplat {
 
-// Reads the splat and decides what to do with it (reading/treatment.h): fills the widths of `input` and what `report`
-// says of them, gives an untagged splat the render mode that it is taken to have, and leaves methods out of `plan` that
-// would harm it. Says in one sentence what was chosen, and warns where the user can do better. `gives_width`: false
-// where the splat stays as wide as it is. kBadArgument: a pixel size that is no positive length, or is given beside
-// cameras; a train width without them.
+// Reads the splat and decides how to enhance it (reading/treatment.h). Fills pixel sizes and filter strength in `input`
+// and their source in `report`, sets an untagged splat's render mode, and removes methods from `plan` that would harm
+// it.
+// Logs the choice in one sentence and warns where the user can do better.
+// Errors (kBadArgument): a pixel size that is not positive, or one given along with cameras; a train width without
+// cameras.
 Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceInput& input, EnhanceReport& report);
 
 }  // namespace anchorsplat

@@ -4,8 +4,8 @@
 
 namespace anchorsplat {
 
-// EnhanceOptions::clean, within the region where there is one. Says what it took out. Errors: those of FindUnseen and
-// OpenProject; kBadArgument: it would take out everything.
+// Removes unseen Gaussians for EnhanceOptions::clean, within the region if there is one, and logs it. Errors: those of
+// FindUnseen and OpenProject; kBadArgument if it would remove everything.
 Status Clean(const EnhanceOptions& options, GaussianCloud& cloud, EnhanceReport& report);
 
 }  // namespace anchorsplat

@@ -15,31 +15,31 @@
 #include "core/parallel.h"
 #include "core/run_context.h"
 #include "core/statistics.h"
-#include "reading/showing_gaussians.h"
+#include "reading/visible_gaussians.h"
 
 namespace anchorsplat {
 
 namespace {
 
 constexpr int64_t kComponentSample = 16'384;
-// Neighbours are joined that are among so many nearest ones of either, no further apart than so many times the distance
-// from either to its fourth, where that distance is much the same: a floater is far from a surface by the surface's own
-// measure, and a chain of floaters begins with few close ones. Two spheres of 5,000 stay two with 300 floaters among
-// them, and become one with 1,000. The largest piece of fits and captures is nine tenths and more of them, the next
-// a hundredth at most; with a reach of 2 it is six tenths and three.
+// Joins neighbours among the kJoined nearest of either, if closer than a multiple of either's distance to its fourth
+// and if these distances are similar. So a floater, far away in the surface's own measure, does not join, nor does a
+// chain of floaters. Two spheres of 5,000 stay separate with 300 floaters among them and merge with 1,000. The largest
+// piece of fits and captures holds at least nine tenths, the next at most a hundredth; with a reach of 2 these are six
+// and three tenths.
 constexpr size_t kJoined = 12, kTypical = 4;
 constexpr double kReach = 3, kMuchTheSame = 2;
-// So few Gaussians that show say nothing about pixels; and the sample's graph has gaps.
+// Minimum size of a component: fewer visible Gaussians say nothing about pixels, and the sample's graph has gaps.
 constexpr double kLeastShowing = 1000, kLeastOfThing = 0.005;
-// Of these a piece may be a splat of its own, if it lies as far from all things as the first share of its own extent
-// and the second of the nearest one's. A wheel is nearer.
+// A piece of this many is separate if its distance from all components is at least kAside of its own extent and
+// kAsideOfThing of the nearest component's. A car's wheel is closer.
 constexpr double kLeastOfPiece = 100, kAside = 0.5, kAsideOfThing = 0.05;
-// So many times as far from a thing as its own neighbours are, a single one belongs to it.
+// A single Gaussian joins a component within this multiple of the local neighbour distance.
 constexpr double kClose = 5;
 constexpr int64_t kLeastSampledOfPiece = 8;
 constexpr int64_t kComponentRowsPerTask = 16'384;
 
-// Disjoint sets; the root of each is its first member.
+// Union-find; the root of a set is its first member.
 class DisjointSets {
  public:
   explicit DisjointSets(int64_t size) : up_(static_cast<size_t>(size)) { std::iota(up_.begin(), up_.end(), size_t{0}); }
@@ -57,7 +57,7 @@ class DisjointSets {
   std::vector<size_t> up_;
 };
 
-// The sample's places, which of them hang together, and how far they are from each other.
+// Neighbour graph of the sample.
 struct Graph {
   Buffer<float> places;    // [n,3]
   Buffer<double> typical;  // [n] squared distances
@@ -93,10 +93,10 @@ Graph JoinNeighbours(Buffer<float> places) {
   return graph;
 }
 
-// What a place of the sample belongs to, where that is no thing.
+// Labels of sample points in no component.
 constexpr int32_t kStray = -1, kPiece = -2;
 
-// Some of the sample, to look for the nearest one among.
+// Nearest-neighbour search among part of the sample.
 class Among {
  public:
   Among(const Graph& graph, const std::vector<int32_t>& label, bool things_only) {
@@ -108,7 +108,7 @@ class Among {
     }
     tree_.emplace(places);
   }
-  // Of the sample; with its squared distance.
+  // Nearest sample point and its squared distance.
   std::pair<size_t, double> Nearest(const float* p) const {
     std::array<KdTree::Neighbour, 1> nearest;
     tree_->NearestTo({p[0], p[1], p[2]}, nearest);
@@ -120,7 +120,7 @@ class Among {
   std::optional<KdTree> tree_;
 };
 
-// Longest side of the box around those of a root.
+// Longest side of a component's bounding box.
 double ExtentOf(const Graph& graph, const std::vector<size_t>& members) {
   double extent = 0;
   for (size_t a = 0; a < 3; ++a) {
@@ -147,7 +147,7 @@ CloudComponents FindComponents(const GaussianCloud& cloud) {
   const Graph graph = JoinNeighbours(std::move(places));
   LeaveIfAbandoned();
 
-  std::vector<std::vector<size_t>> components;  // of more than a few
+  std::vector<std::vector<size_t>> components;  // not the tiny ones
   {
     std::vector<std::vector<size_t>> of_root(graph.size());
     for (size_t k = 0; k < graph.size(); ++k) of_root[graph.root[k]].push_back(k);
@@ -189,7 +189,7 @@ CloudComponents FindComponents(const GaussianCloud& cloud) {
     for (const size_t k : members) with_near[k] = aside ? kPiece : label[nearest.first];
   }
   if (out.count == 1 && !pieces) return {};
-  // What is close to a thing by its own measure is a part of it.
+  // A stray point close to a component, by the local neighbour distance, belongs to it.
   for (size_t k = 0; k < graph.size(); ++k) {
     if (with_near[k] != kStray) continue;
     const auto [of, squared] = of_things.Nearest(graph.Place(k));

@@ -7,19 +7,20 @@
 
 namespace anchorsplat {
 
-// Things of a splat that lie apart, as of several splats that somebody merged, or of a subject before a sky. Each may
-// have been trained at pixels of its own. Of 71 fits and five captures none has more than one.
+// Separate components of a splat, as when several were merged, or a subject in front of a sky. Each may have its own
+// training pixel. None of 71 fits and five captures has more than one.
 struct CloudComponents {
   static constexpr int32_t kNone = -1;
 
-  int64_t count = 1;  // of things with half a percent of the Gaussians that show and 1,000 of them and more, or else of
-                      // the largest
-  Buffer<int32_t> component;  // [N], 0 ≤ … < count, the largest first; kNone for pieces that are too small for a thing
-                              // and lie apart from all of them, and what shows by itself; empty where all is one
+  // Components with at least 1,000 visible Gaussians and half a percent of them all; at least 1, the largest.
+  int64_t count = 1;
+  // [N] 0 ≤ … < count, the largest first; empty if there is one. kNone: pieces too small to count that lie apart from
+  // all components, and single visible Gaussians.
+  Buffer<int32_t> component;
 };
 
-// Connected components of the graph that joins neighbours on the surface. Looks at the Gaussians that show, and at an
-// even sample where there are many; the others belong to the thing that is nearest.
+// Connected components of the neighbour graph on the surface. Uses the visible Gaussians, an even sample if there are
+// many; each other Gaussian joins the nearest component.
 CloudComponents FindComponents(const GaussianCloud& cloud);
 
 }  // namespace anchorsplat

@@ -24,7 +24,7 @@ namespace anchorsplat {
 
 namespace {
 
-// Drops the rows no method and no viewer can use; says how many.
+// Drops rows that no method and no viewer can use, and logs their number.
 Status DropUnusable(GaussianCloud& cloud) {
   if (CountUnusable(cloud) == 0) return {};
   std::vector<int64_t> kept;
@@ -86,13 +86,13 @@ const EnhanceMethod& FilterMethod() {
             options.push_back({"max-gaussians", {}});
             return options;
           }(),
-      .expected = [](int64_t count, const EnhanceOptions& options) -> int64_t {
+      .expected_gaussians = [](int64_t count, const EnhanceOptions& options) -> int64_t {
         return options.max_gaussians > 0 ? std::min(count, options.max_gaussians) : count;
       },
-      .seconds = [](const EnhanceOptions&) { return 4e-7; },
+      .seconds_per_gaussian = [](const EnhanceOptions&) { return 4e-7; },
       .ready = [](const EnhanceOptions&) { return Status(); },
       .run = [](EnhanceInput input, const EnhanceOptions& options, StepReport&) -> Result<GaussianCloud> {
-        LeaveRegion(input);
+        KeepOnlyRegion(input);
         ANCHORSPLAT_RETURN_IF_ERROR([&]() -> Status {
           const auto grown = ApplyFilter(input.cloud, input.pixel_sizes,
                                          {.upscale = options.upscale, .strength = input.filter_strength});
@@ -122,14 +122,14 @@ bool IsInvented(const EnhanceReport& report) {
 int64_t ExpectedGaussians(int64_t count, const EnhanceOptions& options) {
   const Result<MethodPlan> plan = PlanEnhancement(options);
   if (!plan.ok()) return count;
-  if (plan->start != nullptr) count = plan->start->expected(count, options);
-  return plan->method->expected(count, options);
+  if (plan->start != nullptr) count = plan->start->expected_gaussians(count, options);
+  return plan->method->expected_gaussians(count, options);
 }
 
 std::optional<double> ExpectedSeconds(int64_t count, const EnhanceOptions& options, int threads) {
   const Result<MethodPlan> plan = PlanEnhancement(options);
   if (!plan.ok() || plan->start != nullptr) return std::nullopt;
-  const double each = plan->method->seconds(options);
+  const double each = plan->method->seconds_per_gaussian(options);
   return each > 0 ? std::optional(static_cast<double>(count) * each / std::max(1, threads)) : std::nullopt;
 }
 
@@ -160,7 +160,7 @@ Status CheckTask(const GaussianCloud& cloud, const EnhanceOptions& options) {
   return CheckOptions(options);
 }
 
-// Which methods of a plan work with pixel sizes.
+// Which of a plan's methods need pixel sizes.
 struct SizedMethods {
   bool start = false;
   bool any = false;
@@ -176,19 +176,19 @@ Result<SizedMethods> FindSizedMethods(const MethodPlan& plan, const EnhanceOptio
   return sized;
 }
 
-// More than what the closer view's own pixels add.
+// Whether the strength exceeds what the closer view's own pixels add.
 bool GivesWidth(double strength, double upscale, std::optional<RenderMode> mode) {
   return strength > ShownStrength(upscale, mode);
 }
 
-// One method after the other.
+// Runs the methods in order.
 Result<GaussianCloud> RunPlan(const MethodPlan& plan, const SizedMethods& sized, EnhanceInput input,
                               const EnhanceOptions& options, EnhanceReport& report) {
   if (plan.start != nullptr) {
     EnhanceInput first = input;
     if (!sized.start) first.pixel_sizes.clear();
     EnhanceOptions of_first = options;
-    of_first.control = {};  // the checkpoint is the last one's
+    of_first.control = {};  // only the last method writes the checkpoint
     first.is_refined = true;
     ANCHORSPLAT_ASSIGN_OR_RETURN(input.start, RunStep(*plan.start, std::move(first), of_first, report));
     input.start_has_detail = plan.start->adds_detail;
@@ -196,24 +196,24 @@ Result<GaussianCloud> RunPlan(const MethodPlan& plan, const SizedMethods& sized,
   return RunStep(*plan.method, std::move(input), options, report);
 }
 
-// The network's are some of them, the others the filter's.
+// Runs the network on some Gaussians (by_network) and the filter on the others.
 Result<GaussianCloud> RunOnSome(const MethodPlan& plan, EnhanceInput input, EnhanceOptions options,
                                 EnhanceReport& report) {
   EnhanceInput others = input;
-  if (input.inside.empty()) input.inside.assign(input.by_network.size(), 1);
-  others.inside = input.inside;
-  for (size_t i = 0; i < input.by_network.size(); ++i) (input.by_network[i] != 0 ? others : input).inside[i] = 0;
-  const auto left = std::ranges::count(others.inside, 1), taken = std::ranges::count(input.inside, 1);
+  if (input.in_region.empty()) input.in_region.assign(input.by_network.size(), 1);
+  others.in_region = input.in_region;
+  for (size_t i = 0; i < input.by_network.size(); ++i) (input.by_network[i] != 0 ? others : input).in_region[i] = 0;
+  const auto left = std::ranges::count(others.in_region, 1), taken = std::ranges::count(input.in_region, 1);
   MethodPlan filter = plan;
   filter.method = &FilterMethod();
   if (taken == 0) return RunStep(*filter.method, std::move(others), options, report);
   if (left == 0) return RunStep(*plan.method, std::move(input), options, report);
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud filtered, RunStep(*filter.method, std::move(others), options, report));
-  // Neither takes the other's share of a budget.
+  // Splits the budget in proportion.
   if (options.max_gaussians > 1) {
     const auto share = static_cast<double>(left) / static_cast<double>(left + taken);
     const auto most = static_cast<int64_t>(share * static_cast<double>(options.max_gaussians));
-    LeaveOutLeastVisible(std::clamp(most, int64_t{1}, options.max_gaussians - 1), filtered);
+    DropLeastVisible(std::clamp(most, int64_t{1}, options.max_gaussians - 1), filtered);
     SetBudget(options, options.max_gaussians - filtered.size());
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, RunStep(*plan.method, std::move(input), options, report));
@@ -225,7 +225,7 @@ Result<GaussianCloud> RunOnSome(const MethodPlan& plan, EnhanceInput input, Enha
 
 namespace {
 
-// Of a splat whose means are the world.
+// Enhance() for a splat whose means are world coordinates.
 Result<Enhanced> EnhanceFromOrigin(GaussianCloud cloud, const EnhanceOptions& options) {
   const Stopwatch in_all;
   ANCHORSPLAT_RETURN_IF_ERROR(CheckTask(cloud, options));
@@ -242,7 +242,7 @@ Result<Enhanced> EnhanceFromOrigin(GaussianCloud cloud, const EnhanceOptions& op
     const std::string wrong = WrongAxes(*options.cameras, input.cloud.means);
     if (!wrong.empty()) LogWarning("--cameras: " + wrong);
   }
-  // A mark of other parts says nothing about this one.
+  // Marks of other regions do not concern this one.
   std::vector<std::string> marks_of_parts;
   if (options.region) {
     const auto is_mark = [](const std::string& comment) { return comment.starts_with(kPartEnhancedMark); };
@@ -271,12 +271,12 @@ Result<Enhanced> EnhanceFromOrigin(GaussianCloud cloud, const EnhanceOptions& op
   LeaveIfAbandoned();
   const Stopwatch watch;
   EnhanceOptions within = options;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud rest, SetRestAside(options, input, within, report));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud rest, SplitOffOutside(options, input, within, report));
   const bool some = !input.by_network.empty() && plan.start == nullptr;
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, some ? RunOnSome(plan, std::move(input), within, report)
                                                        : RunPlan(plan, sized, std::move(input), within, report));
-  // Methods that make no copies, and what a region's border leaves of them.
-  (void)LeaveOutLeastVisible(within.max_gaussians, out);
+  // Applies to methods without a limit of their own, and to rounding at a region's border.
+  (void)DropLeastVisible(within.max_gaussians, out);
   if (options.region) ANCHORSPLAT_RETURN_IF_ERROR(Append(out, rest));
   report.seconds = watch.Total();
   report.seconds_in_all = in_all.Total();

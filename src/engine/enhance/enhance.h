@@ -25,201 +25,198 @@ namespace anchorsplat {
 
 struct EnhanceMethod;
 
-// What every method is told. Spaces: the cloud in stored space, lengths in world units.
+// Input of every method. The cloud is in stored space, lengths are in world units.
 struct EnhanceOptions {
-  // Ways to enhance that there are; null: BasicMethods(). model/model_method.h has those with networks. Not owned.
+  // Available methods; null: BasicMethods(). model/model_method.h has those with networks. Not owned.
   const std::vector<EnhanceMethod>* methods = nullptr;
-  // What splats are read with; null: the program's own model. Others are for measuring. Not owned.
+  // Model that reads splats; null: the built-in one. Others serve measurements. Not owned.
   const ReadingModel* reading_model = nullptr;
-  // The name of one of them, or "auto": what a reading of the splat says is best, of those that are ready. Or two,
-  // "A+B": B begins where A ended, if it can (EnhanceMethod::takes_start).
+  // Name of a method, or "auto": the one that a reading of the splat finds best among those that are ready. "A+B" runs
+  // A, then B on its result, if B supports that (EnhanceMethod::takes_start).
   std::string method = "auto";
-  // Instead of a method, for those who know none: "fast", an instant one; "good", that and gentle refinement; "best",
-  // refinement with the pictures of refine.images, "good" where there are none. Empty: `method` says.
+  // Alternative to `method`: "fast", an instant method; "good", that plus gentle refinement; "best", refinement with
+  // the pictures of refine.images, or "good" without pictures. Empty: `method` decides.
   std::string quality;
-  // What the user gave, by the names that the command line has for it ("filter-strength"). CheckOptions refuses those
-  // that would change nothing.
+  // Options the user set, by their command-line names ("filter-strength"). CheckOptions rejects those without effect.
   std::vector<std::string> given;
-  // How the splat was rasterized in training, by the caller, who wants it enhanced as such; else its tag says it, or a
-  // reading of the splat.
+  // Render mode in training, set by the caller, which overrides the reading. Unset: the splat's tag, or else its
+  // reading.
   std::optional<RenderMode> mode;
   double upscale = 4;                     // u ≥ 1: how many times closer the splat will be seen
-  std::optional<double> filter_strength;  // f of the filter; DefaultFilterStrength otherwise
-  std::optional<double> pixel_size;       // p_LR for all Gaussians; from `cameras`, from the pictures to refine
-                                          // against, or read off the splat otherwise
-  std::optional<CameraSet> cameras;       // the training cameras
+  std::optional<double> filter_strength;  // f of the filter; unset: DefaultFilterStrength
+  std::optional<double> pixel_size;       // p_LR for all Gaussians; unset: from `cameras`, from the pictures to refine
+                                          // against, or read off the splat
+  std::optional<CameraSet> cameras;       // training cameras
   std::optional<int> train_width;         // pixels; see AssumedTrainWidth
   CameraPixelRule camera_rule = CameraPixelRule::kAuto;
   RefineOptions refine;
-  RefineControl control;  // of methods that take long
+  RefineControl control;  // of long-running methods
   ModelSettings model;    // of networks
-  // Before all else: Gaussians that nobody misses over the training background are taken out. Of the views of `cameras`
-  // or of the pictures to refine against, else of views all around.
+  // First removes Gaussians that cannot be seen over the training background (FindUnseen), in the views of `cameras` or
+  // of the pictures to refine against, or else in views all around.
   bool clean = false;
-  // Gaussians of the result at most; 0: no bound. SetBudget (enhance/gaussian_budget.h) tells the methods'
-  // own options.
+  // Maximum number of Gaussians in the result; 0: no limit. SetBudget (enhance/gaussian_budget.h) also sets the
+  // methods' own options.
   int64_t max_gaussians = 0;
-  // Only what lies in there is enhanced. The rest stays bit by bit, behind it, and a splat of which only a part was is
-  // marked as enhanced in part.
+  // Enhances only Gaussians in this region. The others are appended unchanged, bit by bit, and the splat is marked as
+  // partly enhanced.
   std::optional<Region> region;
-  std::optional<std::array<float, 3>> background;  // of the training views, for `clean` and refinement; what the
-                                                   // cameras say otherwise, else the splat's comment, else black
+  std::optional<std::array<float, 3>> background;  // of the training views, for `clean` and refinement; unset: from the
+                                                   // cameras, else from the splat's comment, else black
   uint64_t seed = 0;
 };
 
-// Whether the caller named the option, by its name without dashes.
+// Whether the user set the option with this name (without dashes).
 bool IsGiven(const EnhanceOptions& options, std::string_view name);
 
-// Where pixel sizes are from.
+// Where pixel sizes come from.
 enum class PixelSizeSource {
-  kNone,      // of methods that need none
-  kGiven,     // the caller says it
+  kNone,      // the method needs none
+  kGiven,     // the caller
   kCameras,   // the training cameras
   kPictures,  // the cameras of the pictures to refine against
   kRead,      // a reading of the splat
-  kUnknown,   // nobody knows: the splat has been left as it is
+  kUnknown,   // none found: the splat is left unchanged
 };
 std::string_view NameOf(PixelSizeSource source);  // "", "given", "cameras", "pictures", "read", "unknown"
 
-// What was done with a thing that lies apart from others.
+// How one component of a splat was treated.
 struct PartTreatment {
   int64_t gaussians = 0;
-  double pixel_size = 0;  // that was taken, world units
+  double pixel_size = 0;  // assumed, world units
   bool by_network = false;
 };
 
-// Something that a method has to tell: whether it was so; counts, which are whole; measurements, which are not.
+// A fact reported by a method: a flag, a count, or a measurement.
 using FactValue = std::variant<bool, int64_t, double>;
 using Fact = std::pair<std::string, FactValue>;
 
-// What one method did; "A+B" are two steps.
+// What one method did; "A+B" has two steps.
 struct StepReport {
   std::string method;
-  int64_t dropped = 0;             // Gaussians that it could not read
-  bool interrupted = false;        // stopped by the user; its result is valid all the same
+  int64_t dropped = 0;             // unreadable Gaussians
+  bool interrupted = false;        // stopped by the user; the result is still valid
   std::optional<RefinePlan> plan;  // of a refinement
-  std::vector<Fact> facts;  // what else it has to tell, by name: the steps of a refinement, the anchors of a network
+  std::vector<Fact> facts;         // further facts by name, such as refinement steps or a network's anchors
 };
 
-// What was done, for people and for --json.
+// What was done, for the log and for --json.
 struct EnhanceReport {
   std::string method;
-  std::string quality;  // as it was asked for
+  std::string quality;  // as requested
   int64_t gaussians_in = 0;
-  int64_t dropped = 0;                     // rows with values that are not finite, and what the steps dropped
-  std::optional<UnseenGaussians> cleaned;  // of those that are not dropped
+  int64_t dropped = 0;                     // non-finite rows, and those dropped by the steps
+  std::optional<UnseenGaussians> cleaned;  // rows numbered without the dropped ones
   int64_t gaussians_out = 0;
-  int64_t region_in = 0;                // Gaussians in the region, where there is one …
-  std::optional<int64_t> kept_outside;  // … and those outside, which are part of the result
+  int64_t region_in = 0;                // Gaussians in the region, if there is one …
+  std::optional<int64_t> kept_outside;  // … and outside, which are part of the result
   double upscale = 1;
   double filter_strength = 0;
-  double pixel_size = 0;  // p_LR, the median when there is one per Gaussian
-  // 10 and 90 % quantiles where a reading says that pixels differ across the splat.
+  double pixel_size = 0;  // p_LR; the median if it differs per Gaussian
+  // 10 and 90 % quantiles, if the reading found that pixels differ across the splat.
   std::optional<std::pair<double, double>> pixel_size_range;
   PixelSizeSource pixel_size_source = PixelSizeSource::kNone;
-  std::optional<Reading> reading;    // of the splat, or of its region; nothing where too little shows
-  std::vector<PartTreatment> parts;  // things that lie apart, each read by itself; none where all is one
-  std::string camera_rule;           // "smallest" or "median" where it came from cameras
-  std::optional<int> train_width;    // pixels, given or assumed; nothing when the cameras' own size was taken
-  std::vector<StepReport> steps;     // in their order; none where the splat was left alone
-  bool interrupted = false;          // one of them was
-  double seconds = 0;                // of the method itself
-  double seconds_in_all = 0;         // with what is found out before, without reading and writing
+  std::optional<Reading> reading;    // of the splat or its region; unset if too little is visible
+  std::vector<PartTreatment> parts;  // separate components, each read by itself; empty if there is one
+  std::string camera_rule;           // "smallest" or "median" if cameras were used
+  std::optional<int> train_width;    // pixels, given or assumed; unset if the cameras' own size was used
+  std::vector<StepReport> steps;     // in order; empty if the splat was left alone
+  bool interrupted = false;          // whether a step was interrupted
+  double seconds = 0;                // of the methods
+  double seconds_in_all = 0;         // including preparation, without reading and writing files
 };
 
-// Whether a method that invents did so.
+// Whether a method ran that invents detail.
 bool IsInvented(const EnhanceReport& report);
 
-// The cloud as methods get it: rows that are not finite are gone; p_LR is known to those that need it.
+// The input of one method. Non-finite rows are gone; pixel sizes are known if the method needs them.
 struct EnhanceInput {
   GaussianCloud cloud;
-  Buffer<float> pixel_sizes;  // one for all, or one per Gaussian
+  Buffer<float> pixel_sizes;  // p_LR, world units, one for all or one per Gaussian
   double pixel_size = 0;      // their median
-  double showing = 1;         // Reading::showing; 1 where nothing was read
+  double visible_share = 1;   // Reading::visible_share; 1 if nothing was read
   double filter_strength = 0;
-  std::vector<char> by_network;   // [N], where a network is not for all: whether it is for this one; else empty
-  bool partly_enhanced = false;   // of another part it says that it has been enhanced: only what is inside tells
-  std::vector<char> inside;       // which of the cloud's Gaussians are enhanced: results are of these; empty: all
-  GaussianCloud start;            // what the method before it made, of "A+B"; else empty
-  bool start_has_detail = false;  // EnhanceMethod::adds_detail of that method
-  bool is_refined = false;        // refinement goes on from what the method makes
+  std::vector<char> by_network;   // [N] whether to use the network for each Gaussian; empty: for all
+  bool partly_enhanced = false;   // another part is marked as enhanced, so only Gaussians inside count for readings
+  std::vector<char> in_region;    // [N] Gaussians to enhance; the result contains only these. Empty: all
+  GaussianCloud start;            // result of method A of "A+B"; else empty
+  bool start_has_detail = false;  // adds_detail of method A
+  bool is_refined = false;        // refinement follows this method
 };
 
-// How a method is about to be used.
+// The context in which a method will run.
 struct MethodUse {
   const EnhanceOptions& options;
-  const EnhanceMethod* start = nullptr;  // the method before it
+  const EnhanceMethod* start = nullptr;  // the method before it, or null
 };
 
-// An option that changes what a method does.
+// An option that affects a method.
 struct MethodOption {
   std::string name;  // as in EnhanceOptions::given
   // What it still needs for that, as the end of "it works only …": "with --images". Nothing, empty: it works.
   std::function<std::string(const MethodUse&)> lacks;
 };
 
-// A way to enhance. `ready` says whether it can run with these options alone (weights there, images given, …) and is
-// what "auto" asks; `rank` orders them, higher is better.
+// A way to enhance. `ready` reports whether it can run with these options alone (weights present, images given, …);
+// "auto" considers only ready ones. Higher `rank` is better.
 struct EnhanceMethod {
   std::string name;
   std::string summary;  // one line for --help
   int rank = 0;
-  bool takes_start = false;  // looks at EnhanceInput::start
-  // Named alone it begins with the best instant method, if that one adds detail.
-  std::function<bool(const EnhanceOptions&)> begins_with_best = [](const EnhanceOptions&) { return false; };
-  bool adds_detail = false;  // shows more than the splat does, not only what it shows with other widths
-  bool invents = false;  // also where a splat has lost nothing there is something to do: what it adds was never seen
-  // Keeps what EnhanceOptions::control names: null for methods that keep nothing. Tells such a file from others, and
-  // the file is the command's own from then on.
+  bool takes_start = false;  // uses EnhanceInput::start
+  // Whether, named alone, it starts from the best instant method's result, if that method adds detail.
+  std::function<bool(const EnhanceOptions&)> starts_from_best = [](const EnhanceOptions&) { return false; };
+  bool adds_detail = false;  // shows new detail, not just the splat's own at other widths
+  bool invents = false;      // adds detail that was never observed, so it applies even to splats that lost nothing
+  // Recognises this method's checkpoints and registers them as the command's own files. Null: writes no checkpoints.
   bool (*is_checkpoint)(const std::filesystem::path&) = nullptr;
-  bool keeps_when_asked = false;      // only where a checkpoint is named, or --resume says that there may be one
-  std::vector<MethodOption> options;  // all that it looks at: this is the only place that says so
-  // False: EnhanceInput::pixel_sizes may be empty, nothing is read. Asked once the method is ready. An error: it
-  // could not run.
+  bool checkpoints_on_request = false;  // writes checkpoints only if one is named, or with --resume
+  std::vector<MethodOption> options;    // every option that affects it; the only list
+  // Whether EnhanceInput::pixel_sizes is needed; if not, the splat is not read. Called after `ready`. Errors prevent
+  // the run.
   std::function<Result<bool>(const EnhanceOptions&)> needs_pixel_size = [](const EnhanceOptions&) { return true; };
-  // About how many Gaussians come of `count`, for what has to be known before the work begins.
-  std::function<int64_t(int64_t count, const EnhanceOptions&)> expected = [](int64_t count, const EnhanceOptions&) {
-    return count;
-  };
-  // Of one Gaussian on one core, about; 0: nobody knows before the work.
-  std::function<double(const EnhanceOptions&)> seconds = [](const EnhanceOptions&) { return 0.0; };
+  // Estimated number of Gaussians made of `count`.
+  std::function<int64_t(int64_t count, const EnhanceOptions&)> expected_gaussians =
+      [](int64_t count, const EnhanceOptions&) { return count; };
+  // Estimated seconds per Gaussian on one core; 0: unknown in advance.
+  std::function<double(const EnhanceOptions&)> seconds_per_gaussian = [](const EnhanceOptions&) { return 0.0; };
   std::function<Status(const EnhanceOptions&)> ready;
   std::function<Result<GaussianCloud>(EnhanceInput, const EnhanceOptions&, StepReport&)> run;
 };
 
 const EnhanceMethod& FilterMethod();
-// Those that need no weights: the filter, and refinement without and with pictures.
+// Methods without weights: the filter, and refinement without and with pictures.
 const std::vector<EnhanceMethod>& BasicMethods();
 const std::vector<EnhanceMethod>& MethodsOf(const EnhanceOptions& options);
 
-// --upscale, and those that say pixel sizes and the filter's strength.
+// The options --upscale, pixel sizes and filter strength.
 std::vector<MethodOption> WidthOptions(const std::function<std::string(const MethodUse&)>& lacks = {});
 
-// Which methods `method` and `quality` lead to.
+// The methods chosen by `method` and `quality`.
 struct MethodPlan {
   const EnhanceMethod* method = nullptr;  // never null
-  const EnhanceMethod* start = nullptr;   // the one whose result it begins with, if there is one
-  std::string chosen_by;                  // "auto" or "--quality …"; empty when the user named the method
+  const EnhanceMethod* start = nullptr;   // the method that runs before it, or null
+  std::string chosen_by;                  // "auto" or "--quality …"; empty if the user named the method
   std::string Name() const;               // "refine", "model+refine"
-  // Whether its last method keeps a checkpoint, as these options are.
+  // Whether the last method writes a checkpoint with these options.
   bool KeepsCheckpoint(const EnhanceOptions& options) const;
 };
 
-// kBadArgument: methods or qualities that there are none of, a method that is not ready or cannot go on from another's
-// result, a quality and a method that is another, pictures for a quality that looks at none.
+// Chooses the methods. Errors (kBadArgument): an unknown method or quality; a method that is not ready or cannot start
+// from another's result; a quality that contradicts the method; pictures with a quality that ignores them.
 Result<MethodPlan> PlanEnhancement(const EnhanceOptions& options);
 
-// kBadArgument: that, or something `given` that has no effect with this plan; says with what it would have one. Names
-// that no method knows are of no concern here.
+// Errors (kBadArgument): those of PlanEnhancement; an option in `given` without effect on this plan (the message says
+// what would give it one). Ignores names that no method knows.
 Status CheckOptions(const EnhanceOptions& options);
 
-// About how many Gaussians Enhance() makes of `count`; `count` where no method can be chosen.
+// Estimated number of Gaussians that Enhance() makes of `count`; `count` if no method can be chosen.
 int64_t ExpectedGaussians(int64_t count, const EnhanceOptions& options);
 
-// About how long it takes on `threads` cores; nothing where that depends on more than their number, as of refinements.
+// Estimated duration on `threads` cores; unset if it depends on more than the count, as for refinements.
 std::optional<double> ExpectedSeconds(int64_t count, const EnhanceOptions& options, int threads);
 
-// With what the error of a splat begins of which no Gaussian can be drawn. Enhance() knows no file name to put before.
+// Start of the error message for a splat without drawable Gaussians. Enhance() knows no file name to prepend.
 inline constexpr std::string_view kNoneUsable = "none of the ";
 
 struct Enhanced {
@@ -227,10 +224,10 @@ struct Enhanced {
   EnhanceReport report;
 };
 
-// Runs the method. Logs what it assumed: what the splat was read as, training width, why one is left alone, how many
-// rows were dropped. A result that was given
-// width back says so in its comments (core/splat_comments.h). kBadArgument: that of CheckOptions, both pixel_size and
-// cameras, upscale < 1; kBadFile: no usable Gaussian; and whatever the method reports.
+// Enhances a splat. Logs its assumptions: the splat's reading, training width, why a splat is left alone, the number of
+// dropped rows. A result with restored width is marked in its comments (core/splat_comments.h).
+// Errors: kBadArgument: those of CheckOptions, pixel_size together with cameras, upscale < 1; kBadFile: no usable
+// Gaussian; those of the method.
 Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options);
 
 }  // namespace anchorsplat

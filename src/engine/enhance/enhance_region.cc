@@ -10,22 +10,22 @@
 
 namespace anchorsplat {
 
-void LeaveRegion(EnhanceInput& input) {
-  if (input.inside.empty()) return;
-  KeepMarked(input.inside, input.cloud);
-  if (input.pixel_sizes.size() > 1) KeepRows(input.pixel_sizes, 1, input.inside);
-  input.inside = {};
+void KeepOnlyRegion(EnhanceInput& input) {
+  if (input.in_region.empty()) return;
+  KeepMarked(input.in_region, input.cloud);
+  if (input.pixel_sizes.size() > 1) KeepRows(input.pixel_sizes, 1, input.in_region);
+  input.in_region = {};
 }
 
-Result<GaussianCloud> SetRestAside(const EnhanceOptions& options, EnhanceInput& input, EnhanceOptions& within,
-                                   EnhanceReport& report) {
+Result<GaussianCloud> SplitOffOutside(const EnhanceOptions& options, EnhanceInput& input, EnhanceOptions& within,
+                                      EnhanceReport& report) {
   if (!options.region) return GaussianCloud();
   const int64_t n = input.cloud.size();
   std::vector<int64_t> outside;
-  input.inside.resize(static_cast<size_t>(n));
+  input.in_region.resize(static_cast<size_t>(n));
   for (int64_t i = 0; i < n; ++i) {
     const bool holds = options.region->Contains(input.cloud.means.data() + 3 * i);
-    input.inside[static_cast<size_t>(i)] = holds ? 1 : 0;
+    input.in_region[static_cast<size_t>(i)] = holds ? 1 : 0;
     if (!holds) outside.push_back(i);
   }
   const int64_t kept = std::ssize(outside);
@@ -34,7 +34,7 @@ Result<GaussianCloud> SetRestAside(const EnhanceOptions& options, EnhanceInput& 
   if (kept == n) {
     const Bounds box = *ComputeBounds(input.cloud);
     const auto corner = [&](const std::array<float, 3>& c) {
-      std::string world = TextOf(ToWorld(c.data(), options.refine.origin));  // as the region was said
+      std::string world = TextOf(ToWorld(c.data(), options.refine.origin));  // in the region's coordinates
       std::ranges::replace(world, ' ', ',');
       return world;
     };

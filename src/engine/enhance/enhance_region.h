@@ -4,13 +4,13 @@
 
 namespace anchorsplat {
 
-// Of a task with a region: marks what lies in it (EnhanceInput::inside) and gives back the rest, for which the budget
-// of `within` no longer has to suffice. Without one: nothing. kBadArgument: no Gaussian lies in the region; the rest
-// alone is more than the budget.
-Result<GaussianCloud> SetRestAside(const EnhanceOptions& options, EnhanceInput& input, EnhanceOptions& within,
-                                   EnhanceReport& report);
+// With options.region: marks the Gaussians inside (EnhanceInput::in_region), reduces the budget of `within` by the
+// others, and returns those others. Without: returns an empty cloud. kBadArgument: the region is empty; the others
+// alone exceed the budget.
+Result<GaussianCloud> SplitOffOutside(const EnhanceOptions& options, EnhanceInput& input, EnhanceOptions& within,
+                                      EnhanceReport& report);
 
-// For methods that look at no others: leaves those inside.
-void LeaveRegion(EnhanceInput& input);
+// Removes Gaussians outside the region, for methods that do not use them as context.
+void KeepOnlyRegion(EnhanceInput& input);
 
 }  // namespace anchorsplat

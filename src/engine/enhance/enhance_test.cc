@@ -8,14 +8,14 @@
 #include "core/source_dir_for_test.h"
 #include "core/splat_comments.h"
 #include "core/text.h"
-#include "enhance/enhance_door_for_test.h"
+#include "enhance/enhance_for_test.h"
 #include "enhance/filter.h"
 #include "formats/cloud_io.h"
 
 namespace anchorsplat {
 namespace {
 
-TEST_F(EnhanceDoor, AutoWithoutANetworkIsTheFilter) {
+TEST_F(EnhanceTest, AutoWithoutANetworkIsTheFilter) {
   const GaussianCloud ball = Ball(0.01);
   EnhanceOptions options;
   options.mode = RenderMode::kClassic;
@@ -32,7 +32,7 @@ TEST_F(EnhanceDoor, AutoWithoutANetworkIsTheFilter) {
   EXPECT_EQ(enhanced->cloud.log_scales, expected.log_scales);
 }
 
-TEST_F(EnhanceDoor, DropsBrokenRowsAndSaysSo) {
+TEST_F(EnhanceTest, DropsBrokenRowsAndSaysSo) {
   GaussianCloud ball = Ball(0.01);
   ball.means[3] = std::nanf("");
   ball.sh[6] = std::numeric_limits<float>::infinity();
@@ -49,7 +49,7 @@ TEST_F(EnhanceDoor, DropsBrokenRowsAndSaysSo) {
   EXPECT_FALSE(Enhance(GaussianCloud{}, options).ok());
 }
 
-TEST_F(EnhanceDoor, KeepsWhatIsOpaqueOrFlat) {
+TEST_F(EnhanceTest, KeepsWhatIsOpaqueOrFlat) {
   GaussianCloud ball = Ball(0.01);
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   ball.opacity_logits[0] = kInfinity;
@@ -67,7 +67,7 @@ TEST_F(EnhanceDoor, KeepsWhatIsOpaqueOrFlat) {
 }
 
 // Their fits have lost less width, and get less back; those of Mip-Splatting next to nothing.
-TEST_F(EnhanceDoor, GivesAntialiasedSplatsLess) {
+TEST_F(EnhanceTest, GivesAntialiasedSplatsLess) {
   for (const RenderMode mode : {RenderMode::kAntialiased, RenderMode::kMip}) {
     GaussianCloud ball = Ball(0.01);
     ball.render_mode = mode;
@@ -94,7 +94,7 @@ TEST_F(EnhanceDoor, GivesAntialiasedSplatsLess) {
 }
 
 // Whoever enhances once more by mistake would lose what the first time brought.
-TEST_F(EnhanceDoor, LeavesWhatItMadeAlone) {
+TEST_F(EnhanceTest, LeavesWhatItMadeAlone) {
   EnhanceOptions options;
   options.mode = RenderMode::kClassic;
   options.pixel_size = 0.01;
@@ -119,7 +119,7 @@ TEST_F(EnhanceDoor, LeavesWhatItMadeAlone) {
   EXPECT_FALSE(IsMarkedEnhanced(Enhance(Ball(0.01), options)->cloud));
 }
 
-TEST_F(EnhanceDoor, PixelSizeFromCameras) {
+TEST_F(EnhanceTest, PixelSizeFromCameras) {
   EnhanceOptions options;
   options.mode = RenderMode::kClassic;
   options.cameras = CamerasForPixel(0.0025);
@@ -139,7 +139,7 @@ TEST_F(EnhanceDoor, PixelSizeFromCameras) {
 }
 
 // Cameras and regions are in the world, wherever the means begin.
-TEST_F(EnhanceDoor, FromAnOriginIsTheSame) {
+TEST_F(EnhanceTest, FromAnOriginIsTheSame) {
   const WorldOrigin origin = {500000, 4500000, 0}, back = {-500000, -4500000, 0};
   EnhanceOptions options;
   options.method = "filter";
@@ -166,7 +166,7 @@ TEST_F(EnhanceDoor, FromAnOriginIsTheSame) {
 }
 
 // Of a fit whose training pixel is 1.7 / 309.02.
-TEST_F(EnhanceDoor, WarnsWhenCamerasAreNotThoseOfTheSplat) {
+TEST_F(EnhanceTest, WarnsWhenCamerasAreNotThoseOfTheSplat) {
   const GaussianCloud cloud = ReadCloud(SourceDirForTest() / "examples/biplane/input.ply").value();
   EnhanceOptions options;
   options.cameras = CamerasForPixel(0.05);
@@ -189,7 +189,7 @@ TEST_F(EnhanceDoor, WarnsWhenCamerasAreNotThoseOfTheSplat) {
   EXPECT_LT(small->report.pixel_size, 0.004);
 }
 
-TEST_F(EnhanceDoor, SaysWhichTrainingWidthItAssumes) {
+TEST_F(EnhanceTest, SaysWhichTrainingWidthItAssumes) {
   EnhanceOptions options;
   options.mode = RenderMode::kClassic;
   options.cameras = CamerasForPixel(0.01);
@@ -207,7 +207,7 @@ TEST_F(EnhanceDoor, SaysWhichTrainingWidthItAssumes) {
   EXPECT_FALSE(Enhance(Ball(0.01), options).ok());  // a training width without cameras
 }
 
-TEST_F(EnhanceDoor, LeavesAloneWhatSaysNothing) {
+TEST_F(EnhanceTest, LeavesAloneWhatSaysNothing) {
   GaussianCloud few = Ball(0.01, 10);
   // Without one nothing can be known to be better.
   for (const char* method : {"auto", "refine"}) {
@@ -222,7 +222,7 @@ TEST_F(EnhanceDoor, LeavesAloneWhatSaysNothing) {
   }
 }
 
-TEST_F(EnhanceDoor, RefusesNonsense) {
+TEST_F(EnhanceTest, RefusesNonsense) {
   EnhanceOptions options;
   options.mode = RenderMode::kClassic;
   options.pixel_size = 0.01;

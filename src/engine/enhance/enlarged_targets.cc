@@ -16,7 +16,7 @@ namespace {
 
 PixelBox WholeOf(const Camera& camera) { return {0, 0, camera.intrinsics.width, camera.intrinsics.height}; }
 
-// [3,H,W] to [3,H·factor,W·factor], within 0 to 1.
+// Enlarges [3,H,W] to [3,H·factor,W·factor], clamped to 0–1.
 Result<Image> EnlargeBy(Upscaler& upscaler, const Image& low, int factor) {
   const int scale = upscaler.info().scale;
   int reached = scale;
@@ -78,7 +78,7 @@ Status EnlargedTargets::Make(int64_t view, const PixelBox& low_window) {
   ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(*still_, camera, render_, output_));
   Clamp01(output_.color);
   for (size_t i = 0; i < made_.picture.pixels.size(); ++i) {
-    made_.picture.pixels[i] = std::lerp(output_.color.pixels[i], made_.picture.pixels[i], kInvented);
+    made_.picture.pixels[i] = std::lerp(output_.color.pixels[i], made_.picture.pixels[i], kNetworkShare);
   }
   ANCHORSPLAT_RETURN_IF_ERROR(ProjectBack(low_target_.picture, made_.picture));
   made_.ignored.clear();

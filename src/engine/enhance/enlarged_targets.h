@@ -17,43 +17,43 @@
 
 namespace anchorsplat {
 
-// How a network's passes make a picture `factor` times larger: as many as do not go beyond it, then cubic convolution
-// for the rest, or one pass averaged down where the network's own scale is a multiple of the factor. Errors
-// (kBadArgument): a factor below the network's scale that does not divide it, or above kMostSamples.
+// Checks that a network of scale `scale` can enlarge by `factor`: as many passes as do not exceed it, then bicubic
+// interpolation for the rest; or one pass averaged down, if its scale is a multiple of the factor. Errors
+// (kBadArgument):
+// a factor below the scale that does not divide it, or above kMostSamples.
 Status CheckFactor(int factor, int scale);
 
-// Adds to `enlarged` [3,H·u,W·u] what its averages over u × u pixels lack of `low` [3,H,W], enlarged by cubic
-// convolution: back-projection (Irani and Peleg 1991), once. Clamped to 0 to 1 afterwards.
+// Corrects `enlarged` [3,H·u,W·u] so that its averages over u × u pixels approach `low` [3,H,W]: one step of
+// back-projection (Irani and Peleg 1991) with bicubic enlargement. Clamps to 0–1.
 Status ProjectBack(const Image& low, Image& enlarged);
 
-// Views u times larger than those of a refinement: in part (kInvented) what a network that enlarges pictures makes of
-// them, in part what `start` shows there, projected back onto the view, so that at its own resolution it is what it
-// was. The network knows what edges look like and not what is there; the splat's own part keeps detail that all views
-// agree on.
+// Views u times larger than a refinement's. Each blends the network's enlargement (share kNetworkShare) with a
+// rendering of `start`, projected back onto the view so that at its own resolution it is unchanged. The network knows
+// how edges look but not what is there; the splat's share keeps detail on which all views agree.
 class EnlargedTargets {
  public:
-  // `start`, `render`: what is refined, and how. `factor`: u.
+  // `start`: the splat to refine. `render`: how it is rendered. `factor`: u.
   EnlargedTargets(RefineTargets low, std::shared_ptr<Upscaler> upscaler, int factor,
                   std::shared_ptr<const GaussianCloud> start, const RenderOptions& render);
 
   const std::vector<Camera>& views() const { return views_; }
 
-  // As RefineTargets::Load, of larger views. Errors: those, and Upscaler::Enlarge's.
+  // As RefineTargets::Load, for the larger views. Errors: those of it and of Upscaler::Enlarge.
   Status Load(int64_t view, const PixelBox& window, RefineTarget& target);
   void LoadAhead(std::span<const int64_t> views) { low_.LoadAhead(views); }
 
  private:
-  // Rounded to bytes: what is kept of many large views.
+  // A cached large view, rounded to bytes.
   struct Kept {
-    bool has_room = false;    // whether there is room for the whole picture: the first ones have
+    bool has_room = false;    // fits the budget as a whole; true for the first views
     Buffer<uint8_t> pixels;   // [3,H,W]; empty: not made yet
-    Buffer<uint8_t> ignored;  // as RefineTarget's
+    Buffer<uint8_t> ignored;  // as RefineTarget::ignored
   };
-  static constexpr int64_t kBudget = int64_t{1} << 30;  // bytes that are kept
-  static constexpr float kInvented = 0.3f;
-  static constexpr int kMargin = 16;  // pixels of the low view around a window, where a view is not kept as a whole
+  static constexpr int64_t kBudget = int64_t{1} << 30;  // bytes of cached views
+  static constexpr float kNetworkShare = 0.3f;
+  static constexpr int kMargin = 16;  // low-resolution pixels around a window, for views not cached as a whole
 
-  // What the larger view shows where the low one has `low_window`, into made_.
+  // Makes the larger view's part for `low_window` of the low one, into made_.
   Status Make(int64_t view, const PixelBox& low_window);
 
   RefineTargets low_;
@@ -66,7 +66,7 @@ class EnlargedTargets {
   std::vector<Kept> kept_;
   Rasterizer rasterizer_;
   RenderOutput output_;
-  RefineTarget low_target_, made_;  // made_: of a window, or of a picture that is about to be kept
+  RefineTarget low_target_, made_;  // made_: of a window, or of a whole view to be cached
 };
 
 }  // namespace anchorsplat

@@ -12,8 +12,8 @@ namespace anchorsplat {
 
 namespace {
 constexpr int64_t kRowsPerTask = 16384;
-// f at an upscale without end. Antialiased fits get 0.12 at u = 4 (docs/results/antialiased.md). Those of Mip-Splatting
-// have their 3-D filter's width; what they get is next to nothing, and for networks to work with.
+// Limit of f for large upscale. Antialiased fits get 0.12 at u = 4 (docs/results/antialiased.md). Mip-Splatting fits
+// keep the width of their 3-D filter; they get almost nothing, just enough for networks to build on.
 constexpr double kClassicShare = 1 - 1 / 3.6, kAntialiasedShare = 0.06, kMipShare = 0.01;
 
 }  // namespace
@@ -48,7 +48,7 @@ Result<int64_t> ApplyFilter(GaussianCloud& cloud, std::span<const float> pixel_s
     }
   }
 
-  // In units of p_LR²: the same for every Gaussian.
+  // In units of p_LR²: equal for all Gaussians.
   const double gain = kDilation * (strength - ShownStrength(options.upscale, cloud.render_mode));
   if (!(gain > 0)) return int64_t{0};
   std::atomic<int64_t> grown = 0;

@@ -20,7 +20,7 @@ void KeepMarked(const std::vector<char>& keep, GaussianCloud& cloud) {
   KeepRows(cloud.sh, cloud.sh_stride(), keep);
 }
 
-int64_t LeaveOutLeastVisible(int64_t most, GaussianCloud& cloud) {
+int64_t DropLeastVisible(int64_t most, GaussianCloud& cloud) {
   const int64_t over = cloud.size() - most;
   if (most == 0 || over <= 0) return 0;
   std::vector<char> keep(static_cast<size_t>(cloud.size()), 0);

@@ -9,14 +9,14 @@ namespace anchorsplat {
 
 struct EnhanceOptions;
 
-// The bound of the result and of the methods' own options, which are one.
+// Sets the limit of the result and of the methods' own options.
 void SetBudget(EnhanceOptions& options, int64_t max_gaussians);
 
-// Closes up the rows for which keep[i] is set.
+// Removes the rows with keep[i] = 0.
 void KeepMarked(const std::vector<char>& keep, GaussianCloud& cloud);
 
-// Leaves the `most` of the largest opacity × size, in their order, with a warning. How many are gone; none where `most`
-// is 0, which is no bound.
-int64_t LeaveOutLeastVisible(int64_t most, GaussianCloud& cloud);
+// Keeps the `most` Gaussians with the largest opacity × size, in order, and warns. Returns how many were dropped. 0
+// means no limit.
+int64_t DropLeastVisible(int64_t most, GaussianCloud& cloud);
 
 }  // namespace anchorsplat

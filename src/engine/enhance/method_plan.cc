@@ -8,7 +8,7 @@ namespace anchorsplat {
 
 namespace {
 
-// The best that is ready and takes no time: the filter always is.
+// The best ready instant method; the filter is always ready.
 const EnhanceMethod* BestInstant(const EnhanceOptions& options) {
   const EnhanceMethod* best = nullptr;
   for (const EnhanceMethod& method : MethodsOf(options)) {
@@ -18,7 +18,7 @@ const EnhanceMethod* BestInstant(const EnhanceOptions& options) {
   return best;
 }
 
-// What refinement can make better: a splat with other widths alone is what it begins with anyway.
+// A start that refinement can use: one that adds detail. Mere width it restores itself.
 const EnhanceMethod* StartWithDetail(const EnhanceOptions& options) {
   const EnhanceMethod* best = BestInstant(options);
   return best->adds_detail ? best : nullptr;
@@ -95,7 +95,7 @@ std::string MethodPlan::Name() const { return start == nullptr ? method->name : 
 
 bool MethodPlan::KeepsCheckpoint(const EnhanceOptions& options) const {
   if (method->is_checkpoint == nullptr || options.refine.seconds) return false;
-  return !method->keeps_when_asked || options.control.resume || !options.control.checkpoint.empty();
+  return !method->checkpoints_on_request || options.control.resume || !options.control.checkpoint.empty();
 }
 
 Result<MethodPlan> PlanEnhancement(const EnhanceOptions& options) {
@@ -105,7 +105,7 @@ Result<MethodPlan> PlanEnhancement(const EnhanceOptions& options) {
   if (plus == std::string::npos) {
     if (options.method == "auto") plan.chosen_by = "auto";
     ANCHORSPLAT_ASSIGN_OR_RETURN(plan.method, FindMethod(options, options.method));
-    if (plan.method->begins_with_best(options)) plan.start = StartWithDetail(options);
+    if (plan.method->starts_from_best(options)) plan.start = StartWithDetail(options);
     return plan;
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(plan.start, FindMethod(options, options.method.substr(0, plus)));

@@ -8,18 +8,18 @@
 
 namespace anchorsplat {
 
-// What the method "model" works with.
+// Settings of the method "model".
 struct ModelSettings {
-  // Weights of either kind of network (model/any_network.h). Empty: the network that is part of the program; the method
-  // is not ready when there is none.
+  // Weights of either kind of network (model/any_network.h). Empty: the built-in network; in builds without one the
+  // method is not ready.
   std::filesystem::path file;
-  WeightPrecision precision = WeightPrecision::kFloat;  // fp32, with a warning, where bfloat16 would be slower
-  // Of the published architecture; of these, compact networks look at `prune_opacity` and `max_gaussians`, which is
-  // about the result there (CopyChoice).
+  WeightPrecision precision = WeightPrecision::kFloat;  // falls back to fp32, with a warning, if bfloat16 is slower
+  // Of the published network. Compact networks use only `prune_opacity` and `max_gaussians`, which limits their output
+  // (CopyChoice).
   PublishedOptions options;
-  // Of compact networks: see CopyChoice of model/compact/copy_choice.h.
-  std::optional<int64_t> copies;     // nothing: auto
-  std::optional<double> merge_cost;  // nothing: as model/compact/copy_choice.h says
+  // Of compact networks: see CopyChoice in model/compact/copy_choice.h.
+  std::optional<int64_t> copies;     // unset: auto
+  std::optional<double> merge_cost;  // unset: the default there
 };
 
 }  // namespace anchorsplat

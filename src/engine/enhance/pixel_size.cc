@@ -20,13 +20,13 @@ namespace {
 
 constexpr int64_t kGaussiansPerTask = 4096;
 
-// A camera as single-precision rows, with what the projection needs precomputed: scenes have millions of Gaussians and
-// thousands of views.
+// A camera in single precision with precomputed projection terms: scenes have millions of Gaussians and thousands of
+// views.
 struct View {
   float r[9];
   float t[3];
   float center[3];
-  float x0, x1, y0, y1;  // x/z and y/z of the image's edges
+  float x0, x1, y0, y1;  // x/z and y/z at the image borders
   float focal;           // sqrt(fx·fy) at the training width
   float near;            // z of the near plane
 };

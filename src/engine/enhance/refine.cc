@@ -28,11 +28,11 @@ namespace anchorsplat {
 namespace {
 
 constexpr int64_t kNoteEvery = 10;        // steps
-constexpr int64_t kShownSteps = 1000;     // of a progress bar over seconds
+constexpr int64_t kShownSteps = 1000;     // resolution of a time-based progress bar
 constexpr double kAboutTheSame = 0.1;     // dB
-constexpr float kInvisible = 1.0f / 255;  // opacity below which a Gaussian can be left out
+constexpr float kInvisible = 1.0f / 255;  // Gaussians below this opacity are pruned
 
-// What a continuation must have in common with what it continues.
+// Settings that must match to resume a run.
 Result<std::string> Settings(const RefineInput& input, const GaussianCloud& start, const RefineOptions& options,
                              const RefineViews& views) {
   nlohmann::json json = nlohmann::json::parse(ToJsonText(options));
@@ -56,7 +56,7 @@ Result<std::string> Settings(const RefineInput& input, const GaussianCloud& star
   return json.dump();
 }
 
-// The last rows alone.
+// The last `rows` rows.
 GaussianCloud Last(const GaussianCloud& cloud, int64_t rows) {
   std::vector<int64_t> last(static_cast<size_t>(rows));
   std::iota(last.begin(), last.end(), cloud.size() - rows);
@@ -68,10 +68,10 @@ GaussianCloud WithoutLast(GaussianCloud cloud, int64_t rows) {
   return cloud;
 }
 
-// Where the state of a run is kept, if it is.
+// Writes and reads a run's checkpoint, if it has one.
 class RefineCheckpoint {
  public:
-  // Runs for seconds have none.
+  // Time-limited runs have none.
   RefineCheckpoint(const RefineControl& control, bool for_seconds, std::string settings)
       : path_(for_seconds ? std::filesystem::path() : control.checkpoint),
         every_(control.checkpoint_every),
@@ -79,7 +79,7 @@ class RefineCheckpoint {
 
   bool kept() const { return !path_.empty(); }
   bool IsDue(int64_t step) const { return kept() && every_ > 0 && step % every_ == 0; }
-  // What cannot be written costs no more than itself.
+  // A failed write is only a warning.
   void Write(const FitState& state, const char* otherwise) const {
     const Status written = WriteFitCheckpoint(path_, state, settings_);
     if (!written.ok()) LogWarning(Cat(otherwise, ": ", written.error().message));
@@ -91,7 +91,7 @@ class RefineCheckpoint {
   std::string settings_;
 };
 
-// Steps until they are done, the time is over or the user stops it.
+// Runs steps until they are done, time is up, or the user stops the run.
 Status MakeSteps(Refiner& refiner, const RefineOptions& options, const RefineCheckpoint& checkpoint,
                  RefineReport& report) {
   const Stopwatch watch;
@@ -109,7 +109,7 @@ Status MakeSteps(Refiner& refiner, const RefineOptions& options, const RefineChe
     ANCHORSPLAT_RETURN_IF_ERROR(refiner.Step(part));
     if (refiner.step() % kNoteEvery == 0) {
       const double last = refiner.LastPsnr();
-      if (last > 0) psnr = psnr == 0 ? last : 0.9 * psnr + 0.1 * last;  // single views differ by several dB
+      if (last > 0) psnr = psnr == 0 ? last : 0.9 * psnr + 0.1 * last;  // smoothed: views differ by several dB
       const auto now = static_cast<int64_t>(std::min(1.0, done()) * static_cast<double>(total));
       note = Cat(Fixed(psnr, 2), " dB at low resolution, ", WithThousands(refiner.size()), " Gaussians");
       progress.Advance(std::max<int64_t>(0, now - shown), note);
@@ -121,14 +121,14 @@ Status MakeSteps(Refiner& refiner, const RefineOptions& options, const RefineChe
       checkpoint.Write(refiner.state(), "no new checkpoint");
     }
     part = done();
-    // Steps that are lost with a GPU are made again, as far as there is time.
-    if (part >= 1 && !refiner.MoveOut()) part = done();
+    // Steps lost with a GPU are repeated while there is time.
+    if (part >= 1 && !refiner.MoveToHost()) part = done();
   }
   if (shown < total) progress.Advance(total - shown, note);
   return {};
 }
 
-// Without what nobody sees and what is not finite, but for the last `fixed`.
+// Removes invisible and non-finite Gaussians, except among the last `fixed`.
 GaussianCloud Pruned(GaussianCloud cloud, int64_t fixed, RefineReport& report) {
   const auto least = static_cast<float>(std::log(kInvisible / (1 - kInvisible)));
   std::vector<int64_t> kept;
@@ -142,7 +142,7 @@ GaussianCloud Pruned(GaussianCloud cloud, int64_t fixed, RefineReport& report) {
   return Subset(cloud, kept).value();
 }
 
-// The iterations, from the start or from a checkpoint, to the last or until the user stops them.
+// Runs the iterations from the start or a checkpoint until done or stopped.
 Result<GaussianCloud> RunRefinement(const RefineInput& input, const GaussianCloud& start, bool resumes, double upscale,
                                     const RefineControl& control, RefineViews& views, RefineReport& report) {
   RefinePlan& plan = report.plan;
@@ -175,12 +175,12 @@ Result<GaussianCloud> RunRefinement(const RefineInput& input, const GaussianClou
   }
   GaussianCloud result = Pruned(std::move(refiner.state().cloud), input.fixed, report);
   result.render_mode = input.cloud.render_mode;
-  result.comments = start.comments;  // a checkpoint has neither
+  result.comments = start.comments;  // checkpoints have neither
   return result;
 }
 
-// Whether the result is better than what it began with; says why not. Of photographs that were not learned from PSNR
-// measures light and poses first: at about the same PSNR, SSIM tells.
+// Whether the result is better than the start, with the reason if not. On held-out photographs PSNR mostly reflects
+// light and poses, so at about equal PSNR, SSIM decides.
 bool IsWorthIt(const RefinePlan& plan, const Consistency& after) {
   const Consistency& before = plan.start;
   if (after.psnr > before.psnr + plan.least_gain) return true;
@@ -216,7 +216,7 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(const RefineOptions options, ChooseRefineOptions(input, given));
   const int64_t left_out = KeepToBudget(options.max_gaussians, input.fixed, input.start);
-  // Of the input, where there may not be all. Only pictures can tell that it is what to begin with.
+  // A copy of the input reduced to the budget. Only pictures can tell whether to start from it.
   std::optional<GaussianCloud> fewer;
   const int64_t changing = input.cloud.size() - input.fixed;
   if (!options.images.empty() && options.max_gaussians > 0 && changing > options.max_gaussians) {
@@ -245,7 +245,7 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
     upscale = 1;
     ANCHORSPLAT_ASSIGN_OR_RETURN(report.plan.start,
                                  MeasureConsistency(start, upscale, input.cloud, plan.options, views));
-    report.plan.least_gain = 0;  // what it knows more than the pictures is in the views now
+    report.plan.least_gain = 0;  // the enlarged views include what the splat knows beyond the pictures
     report.before = plan.start.psnr;
   }
 

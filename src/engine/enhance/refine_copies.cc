@@ -20,7 +20,7 @@ constexpr double kMostPerPixel = 2;  // Gaussians, half of them unseen
 Result<ViewDensity> MeasureDensity(const GaussianCloud& cloud, const RenderOptions& render,
                                    const std::vector<Camera>& cameras) {
   ViewDensity density;
-  const std::vector<Camera> views = Thinned(cameras, kDensityViews);
+  const std::vector<Camera> views = SubsampleEvenly(cameras, kDensityViews);
   Rasterizer rasterizer;
   ConstantCloud still(cloud);
   const auto add = [&](size_t at, const RenderOutput& output) -> Status {

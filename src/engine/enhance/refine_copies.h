@@ -10,19 +10,19 @@
 
 namespace anchorsplat {
 
-// How densely a splat covers its views, on the mean over some of them.
+// Density of Gaussians in the views, averaged over some of them.
 struct ViewDensity {
-  double pixels = 0;     // that show it: alpha of a half and more
-  double gaussians = 0;  // whose centre is within the picture
+  double pixels = 0;     // pixels covered, with alpha of at least a half
+  double gaussians = 0;  // Gaussians with their centre in the picture
 };
 
-// Looks at up to 16 of the cameras. Errors: those of Rasterizer.
+// Measures up to 16 of the views. Errors: those of Rasterizer.
 Result<ViewDensity> MeasureDensity(const GaussianCloud& cloud, const RenderOptions& render,
                                    const std::vector<Camera>& cameras);
 
-// Into how many each of the `start` Gaussians that a refinement begins with is split, at least 1: so that there are
-// `wanted` for each of the `input` ones, but no more than closer views can show. These have upscale² pixels for each of
-// `density`, and half of the Gaussians are on the other side of what is seen: two for a pixel are enough. Says so.
+// Number of copies, at least 1, into which to split each of the `start` Gaussians. Aims at `wanted` per `input`
+// Gaussian, but at no more than closer views can show: 2 per pixel, since half the Gaussians are on the far side and
+// closer views have upscale² pixels for each in `density`. Logs the choice.
 int ChooseCopies(const ViewDensity& density, double upscale, int wanted, int64_t input, int64_t start);
 
 }  // namespace anchorsplat

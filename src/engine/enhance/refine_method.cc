@@ -49,20 +49,20 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
   refine.seed = options.seed;
   refine.start_has_detail = input.start_has_detail;
   refine.start = std::move(input.start);
-  const int64_t inside = input.inside.empty() ? input.cloud.size() : std::ranges::count(input.inside, 1);
+  const int64_t inside = input.in_region.empty() ? input.cloud.size() : std::ranges::count(input.in_region, 1);
   if (refine.start.empty()) {
     EnhanceInput filtered;
     filtered.cloud = input.cloud;
     filtered.pixel_sizes = std::move(input.pixel_sizes);
-    filtered.inside = input.inside;
-    LeaveRegion(filtered);
+    filtered.in_region = input.in_region;
+    KeepOnlyRegion(filtered);
     input.pixel_sizes = std::move(filtered.pixel_sizes);
     refine.start = std::move(filtered.cloud);
     const auto grown =
         ApplyFilter(refine.start, input.pixel_sizes, {.upscale = options.upscale, .strength = input.filter_strength});
     if (!grown.ok()) return grown.error();
   }
-  // No more than what the closer view's own pixels add.
+  // At most what the closer view's own pixels add.
   const std::optional<RenderMode> mode = input.cloud.render_mode;
   const bool lost_none = input.filter_strength <= ShownStrength(options.upscale, mode);
   const bool detail = !options.refine.enlarge_with.empty();
@@ -81,12 +81,12 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
   refine.fixed = input.cloud.size() - inside;
   refine.cloud = std::move(input.cloud);
   if (refine.fixed > 0) {
-    // What stays goes behind what is refined, in both.
-    std::vector<char> outside = input.inside;
+    // Fixed Gaussians come last in both clouds.
+    std::vector<char> outside = input.in_region;
     for (char& flag : outside) flag = flag == 0 ? 1 : 0;
     GaussianCloud rest = refine.cloud;
     KeepMarked(outside, rest);
-    KeepMarked(input.inside, refine.cloud);
+    KeepMarked(input.in_region, refine.cloud);
     ANCHORSPLAT_RETURN_IF_ERROR(Append(refine.cloud, rest));
     ANCHORSPLAT_RETURN_IF_ERROR(Append(refine.start, rest));
   }
@@ -101,7 +101,7 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
 bool HasImages(const MethodUse& use) { return !use.options.refine.images.empty(); }
 bool HasCameras(const MethodUse& use) { return use.options.cameras.has_value(); }
 
-// What refinement looks at, of either of its methods.
+// Options that affect refinement, in both its methods.
 std::vector<MethodOption> RefinementOptions() {
   const auto with_images = [](const MethodUse& use) { return HasImages(use) ? "" : "with --images"; };
   const auto filtered = [](const MethodUse& use) {
@@ -146,7 +146,7 @@ std::vector<MethodOption> RefinementOptions() {
 
 bool WithPictures(const EnhanceOptions& options) { return !options.refine.images.empty(); }
 
-// At least; without --k it depends on what there is to see.
+// Minimum; without --k it depends on the views.
 int64_t Expected(int64_t count, const EnhanceOptions& options) {
   const int64_t wanted = count * options.refine.copies.value_or(1), most = options.refine.max_gaussians;
   return most > 0 ? std::min(wanted, most) : wanted;
@@ -159,17 +159,17 @@ EnhanceMethod RefineMethod() {
           .summary = "optimise against low-resolution renders of the splat, or --images; a minute",
           .rank = -1,  // never without being asked: it takes its time
           .takes_start = true,
-          .begins_with_best = WithPictures,
+          .starts_from_best = WithPictures,
           .is_checkpoint = IsFitCheckpoint,
           .options = RefinementOptions(),
-          .expected = Expected,
+          .expected_gaussians = Expected,
           .ready = [](const EnhanceOptions& options) { return Validate(options.refine); },
           .run = RunRefine};
 }
 
 namespace {
 
-// Also what its file says, so that nothing is done before that is known.
+// Also reads the network file, so that errors appear before any work.
 Status CheckDetail(const EnhanceOptions& options) {
   const std::filesystem::path& file = options.refine.enlarge_with;
   if (file.empty()) {
@@ -190,17 +190,17 @@ Status CheckDetail(const EnhanceOptions& options) {
 
 EnhanceMethod DetailMethod() {
   std::vector<MethodOption> looked_at = RefinementOptions();
-  std::erase_if(looked_at, [](const MethodOption& option) { return option.name.ends_with("-from"); });  // all rays are
+  std::erase_if(looked_at, [](const MethodOption& option) { return option.name.ends_with("-from"); });  // uses all rays
   looked_at.push_back({"enlarge-with", {}});
   return {.name = "detail",
           .summary = "refine against views enlarged by --enlarge-with; invents detail",
           .rank = -1,
           .takes_start = true,
-          .begins_with_best = [](const EnhanceOptions&) { return true; },
+          .starts_from_best = [](const EnhanceOptions&) { return true; },
           .invents = true,
           .is_checkpoint = IsFitCheckpoint,
           .options = std::move(looked_at),
-          .expected = Expected,
+          .expected_gaussians = Expected,
           .ready = CheckDetail,
           .run = RunRefine};
 }
@@ -210,10 +210,10 @@ EnhanceMethod RefineImagesMethod() {
           .summary = "refine against --images",
           .rank = 2,
           .takes_start = true,
-          .begins_with_best = WithPictures,
+          .starts_from_best = WithPictures,
           .is_checkpoint = IsFitCheckpoint,
           .options = RefinementOptions(),
-          .expected = Expected,
+          .expected_gaussians = Expected,
           .ready = [](const EnhanceOptions& options) -> Status {
             if (!options.refine.images.empty()) return Validate(options.refine);
             return Error{ErrorCode::kBadArgument, "the method 'refine-images' needs --images PROJECT"};

@@ -4,9 +4,8 @@
 
 namespace anchorsplat {
 
-// The methods "refine" (with pictures where options.refine.images says where they are, else without), "refine-images"
-// (which is only ready with pictures) and "detail" (which is only ready with options.refine.enlarge_with), for the
-// registry of enhance/enhance.h.
+// The methods "refine" (with pictures if options.refine.images is set), "refine-images" (requires pictures) and
+// "detail" (requires options.refine.enlarge_with), for the list in enhance/enhance.h.
 EnhanceMethod RefineMethod();
 EnhanceMethod DetailMethod();
 EnhanceMethod RefineImagesMethod();

@@ -14,7 +14,7 @@ namespace anchorsplat {
 
 namespace {
 
-// Whether `number` is one that T can be; then `to` is that.
+// Stores `number` in `to` if it is representable as T.
 template <class T>
 bool Assign(double number, T& to) {
   if constexpr (std::is_same_v<T, bool>) {
@@ -36,13 +36,13 @@ struct NamedOption {
   bool (*set)(RefineOptions&, double);
 };
 
-// As on the command line, which declares them with their help.
+// Keys as on the command line, which declares their help.
 constexpr NamedOption kOptions[] = {
     {"steps", [](RefineOptions& o, double x) { return Assign(x, o.steps); }},
     {"seconds", [](RefineOptions& o, double x) { return Assign(x, o.seconds); }},
     {"k", [](RefineOptions& o, double x) { return Assign(x, o.copies); }},
     {"max-gaussians", [](RefineOptions& o, double x) { return Assign(x, o.max_gaussians); }},
-    {"most-gaussians", [](RefineOptions& o, double x) { return Assign(x, o.max_gaussians); }},  // its old name
+    {"most-gaussians", [](RefineOptions& o, double x) { return Assign(x, o.max_gaussians); }},  // former name
     {"hold-out", [](RefineOptions& o, double x) { return Assign(x, o.hold_out); }},
     {"downscale", [](RefineOptions& o, double x) { return Assign(x, o.downscale); }},
     {"poses", [](RefineOptions& o, double x) { return Assign(x, o.poses); }},
@@ -99,7 +99,7 @@ Status Validate(const RefineOptions& o) {
 }
 
 std::string ToJsonText(const RefineOptions& o) {
-  // One level, so that what differs can be named by one word.
+  // Flat, so that a difference has a single name.
   nlohmann::json json = {
       {"images", !o.images.empty()},
       {"hold_out", o.hold_out.value_or(-1)},

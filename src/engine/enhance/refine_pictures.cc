@@ -17,20 +17,20 @@ namespace anchorsplat {
 
 namespace {
 constexpr int64_t kMostViews = 16;
-constexpr double kIdentical = 100;  // dB, in means
-// dB by which smaller pictures have to agree better. Noise of the pictures alone, which their halves have less of,
-// makes up to 6, but then a standard splat's own renders are wrong there by more.
+constexpr double kIdentical = 100;  // dB of identical pictures, for means
+// dB by which smaller pictures must match better. Noise in the pictures, reduced by halving, accounts for up to 6; but
+// then a standard splat's renders are off by more.
 constexpr double kSmallerIsRight = 4;
 
-// Of a view that agrees with its picture less than the median of all views does.
+// dB below the median view's PSNR.
 constexpr double kFarBelow = 8;
-// dB by which a picture must agree better elsewhere, and where that is.
+// dB by which a picture must match better when moved or enlarged.
 constexpr double kMisplaced = 2;
-constexpr double kZoomPixels = 1.25;  // that a border moves by, seen from the middle
+constexpr double kZoomPixels = 1.25;  // shift of the border, from the centre
 
 double Capped(const Result<double>& psnr) { return psnr.ok() ? std::min(*psnr, kIdentical) : 0; }
 
-// The nearest that a picture of one colour comes.
+// PSNR of the best single-colour picture.
 double PsnrOfPlain(const Image& picture) {
   Image plain(picture.width, picture.height, 3);
   for (int c = 0; c < 3; ++c) {
@@ -41,7 +41,7 @@ double PsnrOfPlain(const Image& picture) {
   return Capped(Psnr(plain, picture));
 }
 
-// PSNR over the pixels that have neighbours on all sides, of `shown` against `truth` moved by (dx, dy).
+// PSNR of `shown` against `truth` moved by (dx, dy), over pixels with neighbours on all sides.
 double PsnrMoved(const Image& shown, const Image& truth, int dx, int dy) {
   double sum = 0;
   for (int c = 0; c < 3; ++c) {
@@ -57,8 +57,7 @@ double PsnrMoved(const Image& shown, const Image& truth, int dx, int dy) {
   return mean > 0 ? std::min(kIdentical, -10 * std::log10(mean)) : kIdentical;
 }
 
-// By how many dB the picture is nearer to the splat when it is moved by a pixel, or when the camera's focal length is
-// another, by so much that borders move as far; 0 at least.
+// Gain in dB of the best shift by a pixel, or change of focal length that moves the borders as far; at least 0.
 Result<double> GainElsewhere(ConstantCloud& cloud, Rasterizer& rasterizer, const RenderOptions& render,
                              const Camera& camera, const Image& shown, const Image& truth) {
   if (std::min(truth.width, truth.height) < kLeastSide) return 0.0;
@@ -80,7 +79,7 @@ Result<double> GainElsewhere(ConstantCloud& cloud, Rasterizer& rasterizer, const
   return best - own;
 }
 
-// The mean of blocks of 2 × 2 pixels; what is over at the right and at the bottom is left out.
+// Means of 2 × 2 blocks; drops an odd last column or row.
 Image Halved(const Image& image) {
   Image half(image.width / 2, image.height / 2, image.channels);
   for (int c = 0; c < image.channels; ++c) {
@@ -103,7 +102,7 @@ Camera Halved(const Camera& camera) {
   return half;
 }
 
-// Fills in `smaller_psnr` and `smaller`. `cameras` and `pictures` become the last sizes that were looked at.
+// Sets `smaller_psnr` and `smaller`. Reduces `cameras` and `pictures` in place.
 Status MeasureSmaller(ConstantCloud& cloud, const RenderOptions& render, std::vector<Camera>& cameras,
                       std::vector<Image>& pictures, PictureAgreement& agreement) {
   Rasterizer rasterizer;
@@ -173,7 +172,7 @@ Result<PictureAgreement> MeasureAgreement(const GaussianCloud& cloud, const Rend
     agreement.psnr += std::min(own, kIdentical) / static_cast<double>(agreement.views);
     agreement.plain += PsnrOfPlain(truth[i]) >= own;
     const bool mismatched = std::any_of(truth.begin(), truth.end(), [&](const Image& other) {
-      const auto psnr = Psnr(shown[i], other);  // fails for another size, which is no rival
+      const auto psnr = Psnr(shown[i], other);  // fails for other sizes, which cannot be confused
       return psnr.ok() && *psnr > own;
     });
     agreement.mismatched += mismatched;

@@ -15,14 +15,14 @@ namespace {
 
 constexpr int64_t kStepsWithPictures = 1500, kStepsWithout = 600;
 constexpr int kCopiesWithPictures = 8, kCopiesWithout = 4;
-// Without pictures, a start that shows more than the splat does would lose it to what the splat shows: a few small
-// steps bring what both know. Chosen on the validation objects (docs/refine.md).
+// Without pictures, a start with more detail than the splat would lose it to the splat's renders; a few small steps
+// keep what both agree on. Chosen on the validation objects (docs/refine.md).
 constexpr int64_t kStepsGentle = 100;
 constexpr double kRate = 1, kRateGentle = 0.1;
-// Against enlarged views, of which no two say quite the same.
+// Against enlarged views, which contradict each other slightly.
 constexpr int64_t kStepsOfDetail = 300;
 constexpr double kRateOfDetail = 0.3;
-constexpr double kIndistinguishable = 58.9;  // dB: what rounding to 8 bits makes, 1/√12 of a step
+constexpr double kIndistinguishable = 58.9;  // dB of 8-bit rounding error, 1/√12 of a step
 constexpr double kGainOverFine = 2;          // dB at low resolution, see below
 
 bool HasPictures(const RefineOptions& options) { return !options.images.empty(); }
@@ -31,8 +31,9 @@ bool IsGentle(const RefineInput& input, const RefineOptions& options) {
 }
 bool IsDetail(const RefineOptions& options) { return !options.enlarge_with.empty(); }
 
-// What becomes of a splat within `max_gaussians`: the last `fixed` stay one, and what is left of it goes to the largest
-// opacity × size. Nothing where there is room for all.
+// Copies per Gaussian within `max_gaussians`: the last `fixed` stay single, the rest goes to the largest opacity ×
+// size.
+// Empty if there is room for all.
 std::vector<int> CopiesWithin(const GaussianCloud& start, int64_t fixed, RefineOptions& options) {
   const int64_t n = start.size() - fixed, most = options.max_gaussians;
   const bool bound = most > 0 && n * *options.copies > most;
@@ -87,12 +88,12 @@ Result<RefinePlan> PlanRefinement(const RefineInput& input, const GaussianCloud&
   const bool pictures = HasPictures(chosen);
   ANCHORSPLAT_ASSIGN_OR_RETURN(plan.start, MeasureConsistency(input.start, input.upscale, input.cloud, chosen, views));
 
-  // A splat that was trained on larger pictures than these, or without dilation, knows details that these do not show;
-  // learning them by heart costs it those. Measured with fits to views four times as large (docs/refine.md): one that
-  // gained 1.5 dB at low resolution lost 0.5 dB at high resolution; one that gained 2.6 dB won there, too.
+  // A splat trained on larger pictures, or without dilation, has detail that these pictures lack, and fitting them
+  // would destroy it. Measured on fits to views four times as large (docs/refine.md): one that gained 1.5 dB at low
+  // resolution lost 0.5 dB at high resolution; one that gained 2.6 dB gained there, too.
   if (pictures && IsCompensated(views.render.mode)) plan.least_gain = kGainOverFine;
   if (pictures) {
-    // A splat that has lost no width is spoiled by what gives it back: the pictures tell.
+    // Restoring width spoils a splat that lost none; the pictures decide.
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Consistency agreement,
                                  MeasureConsistency(as_it_is, input.upscale, input.cloud, chosen, views));
     if (agreement.psnr > plan.start.psnr) {
@@ -125,8 +126,7 @@ Result<RefinePlan> PlanRefinement(const RefineInput& input, const GaussianCloud&
     plan.gaussians = 0;
     return plan;
   }
-  // More where the pictures find more wrong. Without pictures the differences are what the fit itself got wrong; copies
-  // do not help there.
+  // More copies where the pictures show more error. Without pictures, errors are the fit's own, and copies do not help.
   if (pictures && wanted > changing) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<double> residuals, Residuals(start, input.upscale, views));
     residuals.resize(static_cast<size_t>(changing));

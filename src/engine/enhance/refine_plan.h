@@ -6,17 +6,17 @@
 
 namespace anchorsplat {
 
-// The parts of the plan that depend on what is asked alone. kBadArgument: options that cannot be run, options about
-// photographs without photographs.
+// Chooses the options that depend on the request alone. Errors (kBadArgument): options that cannot be run; picture
+// options without pictures.
 Result<RefineOptions> ChooseRefineOptions(const RefineInput& input, const RefineOptions& given);
 
-// Leaves as many of all but the last `fixed` Gaussians as there may be, those of the largest opacity × size; 0: no
-// bound. How many went.
+// Reduces all but the last `fixed` Gaussians to fit `max_gaussians`, keeping the largest opacity × size; 0: no limit.
+// Returns how many were dropped.
 int64_t KeepToBudget(int64_t max_gaussians, int64_t fixed, GaussianCloud& start);
 
-// The rest: looks at the views. `as_it_is` is the input as refinement could begin with it: within its bound. What
-// `resumes` is not split, so that nothing is measured for that. Errors: those of MeasureConsistency, MeasureDensity and
-// Residuals.
+// Completes the plan by measuring the views. `as_it_is`: the input, within its limit, as a possible start. `resumes`: a
+// checkpoint provides the Gaussians, so splitting is not planned. Errors: those of MeasureConsistency, MeasureDensity
+// and Residuals.
 Result<RefinePlan> PlanRefinement(const RefineInput& input, const GaussianCloud& as_it_is, const RefineOptions& chosen,
                                   bool resumes, RefineViews& views);
 

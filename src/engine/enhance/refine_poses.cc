@@ -23,16 +23,16 @@ namespace anchorsplat {
 namespace {
 
 constexpr double kPoseFieldOfView = std::numbers::pi / 4;
-constexpr int kSmallestSide = 32;    // pixels: less says nothing, and SSIM's window needs 11
-constexpr float kHides = 0.1f;       // a Gaussian that hides something
-constexpr double kRoom = 0.05;       // of the distance to the object: nothing opaque may be nearer to a camera
-constexpr double kSigmas = 3;        // and the camera may not be within a Gaussian
+constexpr int kSmallestSide = 32;    // pixels; smaller ones are useless, and SSIM's window needs 11
+constexpr float kHides = 0.1f;       // opacity of Gaussians that obstruct a camera
+constexpr double kRoom = 0.05;       // clearance around a camera, relative to the distance of the object
+constexpr double kSigmas = 3;        // clearance from a Gaussian, in standard deviations
 constexpr double kSameWay = 0.7071;  // cosine of 45°
 constexpr double kSameFocal = 1e-3;  // relative
 constexpr int kCheckNeighbours = 3;
 constexpr int64_t kCheckCandidates = 256;
 constexpr int64_t kCamerasPerCheck = 6;
-constexpr float kSamePose = 1e-6f;  // of PoseDistance: cameras that stand in one place have nothing between them
+constexpr float kSamePose = 1e-6f;  // PoseDistance below which there is nothing between two cameras
 
 using Vec3 = std::array<double, 3>;
 
@@ -45,7 +45,7 @@ bool IsObstructed(const GaussianCloud& cloud, const Vec3& center, double room) {
       const float* s = cloud.log_scales.data() + 3 * i;
       const double distance = std::hypot(p[0] - center[0], p[1] - center[1], p[2] - center[2]);
       const double reach = std::max(room, kSigmas * std::exp(double{std::max({s[0], s[1], s[2]})}));
-      // The bound by the largest axis is rough, but only for Gaussians nearly as large as the object.
+      // Using the largest axis is a rough bound, but only for Gaussians nearly as large as the object.
       if (distance < reach && Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]) > kHides) obstructed = true;
     }
   });
@@ -78,7 +78,7 @@ std::vector<size_t> Neighbours(const std::vector<Camera>& cameras, size_t i, siz
   return neighbours;
 }
 
-// Half-way from a to b.
+// The pose half-way between a and b.
 Camera Between(const Camera& a, const Camera& b) {
   auto p = QuaternionFromRotation(a.world_to_camera.rotation), q = QuaternionFromRotation(b.world_to_camera.rotation);
   double dot = 0;
@@ -97,7 +97,7 @@ Camera Between(const Camera& a, const Camera& b) {
   return camera;
 }
 
-// Turns a point on the unit sphere by a rotation drawn from the seed.
+// Rotates a point on the unit sphere by a random rotation.
 std::array<double, 9> RandomRotation(uint64_t seed) {
   Random random = RandomStream(seed, RandomPurpose::kPoses);
   double q[4];
@@ -154,7 +154,7 @@ Result<std::vector<Camera>> PosesAround(const GaussianCloud& cloud, double pixel
 
 std::vector<Camera> PosesAlong(const std::vector<Camera>& cameras, int between) {
   std::vector<Camera> poses = cameras;
-  std::set<std::pair<size_t, size_t>> there;  // most pairs are neighbours of each other
+  std::set<std::pair<size_t, size_t>> there;  // neighbours are mostly mutual
   for (size_t i = 0; i < cameras.size() && between > 0; ++i) {
     for (const size_t k : Neighbours(cameras, i, static_cast<size_t>(between))) {
       if (there.insert(std::minmax(i, k)).second) poses.push_back(Between(cameras[i], cameras[k]));
@@ -166,13 +166,13 @@ std::vector<Camera> PosesAlong(const std::vector<Camera>& cameras, int between) 
 double PoseDistance(const Camera& a, const Camera& b, double scale) {
   const Vec3 p = a.Center(), q = b.Center();
   const auto &r = a.world_to_camera.rotation, &s = b.world_to_camera.rotation;
-  double square = 0;  // of what the matrices differ by: 8 sin²(angle/2)
+  double square = 0;  // squared Frobenius distance of the rotations: 8 sin²(angle/2)
   for (size_t k = 0; k < 9; ++k) square += (r[k] - s[k]) * (r[k] - s[k]);
   const double angle = 2 * std::asin(std::min(1.0, std::sqrt(square / 8)));
   return std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]) / scale + angle;
 }
 
-std::vector<Camera> Thinned(const std::vector<Camera>& cameras, int64_t most) {
+std::vector<Camera> SubsampleEvenly(const std::vector<Camera>& cameras, int64_t most) {
   const auto count = static_cast<int64_t>(cameras.size());
   std::vector<Camera> some;
   for (int64_t i = 0; i < std::min(most, count); ++i) {
@@ -183,7 +183,7 @@ std::vector<Camera> Thinned(const std::vector<Camera>& cameras, int64_t most) {
 
 namespace {
 
-// How far the pose is from the nearest of `others` that is not itself.
+// Distance from a pose to the nearest of `others` other than itself.
 float Clearance(const Camera& pose, const std::vector<Camera>& others, double scale) {
   double least = std::numeric_limits<double>::infinity();
   for (const Camera& other : others) {
@@ -192,7 +192,7 @@ float Clearance(const Camera& pose, const std::vector<Camera>& others, double sc
   return static_cast<float>(least);
 }
 
-// The half of `places` that is farthest from all of `cameras`, which may be the same.
+// The half of `places` farthest from all of `cameras`, which may be the same.
 std::vector<Camera> ClearOf(const std::vector<Camera>& cameras, const std::vector<Camera>& places, double scale) {
   std::vector<float> clearances;
   for (const Camera& place : places) clearances.push_back(Clearance(place, cameras, scale));
@@ -212,16 +212,16 @@ RefinePoses RefinePosesAlong(const std::vector<Camera>& cameras, int between, in
   for (const Camera& camera : cameras) {
     for (const double x : camera.Center()) reach = std::max(reach, std::abs(x));
   }
-  const double scale = std::max(SceneScale(cameras), kSamePose * reach);  // of one place it is what rounding leaves
-  // Not only the nearest neighbours: these may be twins, as of stereo pairs.
+  const double scale = std::max(SceneScale(cameras), kSamePose * reach);  // for coincident cameras, rounding error
+  // Several neighbours, as the nearest may be a twin in a stereo pair.
   std::vector<Camera> places = PosesAlong(cameras, std::max(between, kCheckNeighbours));
   places.erase(places.begin(), places.begin() + std::ssize(cameras));
-  // Of few cameras all the places between them would go.
+  // With few cameras this would take all poses between them.
   const auto count = std::ssize(cameras);
   RefinePoses poses;
   poses.train = PosesAlong(cameras, between);
-  poses.check =
-      Thinned(ClearOf(cameras, Thinned(places, kCheckCandidates), scale), std::clamp<int64_t>(count / 3, 1, checks));
+  poses.check = SubsampleEvenly(ClearOf(cameras, SubsampleEvenly(places, kCheckCandidates), scale),
+                                std::clamp<int64_t>(count / 3, 1, checks));
   if (!poses.check.empty()) {
     for (const Camera& check : poses.check) {
       const double room = 0.5 * Clearance(check, cameras, scale);
@@ -231,12 +231,12 @@ RefinePoses RefinePosesAlong(const std::vector<Camera>& cameras, int between, in
     }
     return poses;
   }
-  // Too far from each other to have anything between them: some of them, if there are enough.
+  // Cameras are too far apart for poses between them: holds out some of them, if there are enough.
   const std::vector<Camera> clear = ClearOf(cameras, cameras, scale);
-  poses.check = Thinned(clear, std::min(count / kCamerasPerCheck, checks));
+  poses.check = SubsampleEvenly(clear, std::min(count / kCamerasPerCheck, checks));
   poses.apart = !poses.check.empty();
   if (!poses.apart) {
-    poses.check = Thinned(cameras, checks);
+    poses.check = SubsampleEvenly(cameras, checks);
     return poses;
   }
   for (const Camera& check : poses.check) {
@@ -249,7 +249,7 @@ Result<RefinePoses> RefinePosesAround(const GaussianCloud& cloud, double pixel_s
                                       uint64_t seed) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> all, PosesAround(cloud, pixel_size, count + checks, seed));
   RefinePoses poses;
-  poses.check = Thinned(all, checks);
+  poses.check = SubsampleEvenly(all, checks);
   size_t next = 0;
   for (Camera& pose : all) {
     if (next < poses.check.size() && pose.name == poses.check[next].name) {

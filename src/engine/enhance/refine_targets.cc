@@ -12,7 +12,7 @@ namespace anchorsplat {
 namespace {
 
 constexpr int kTargetRowsPerTask = 32;
-constexpr float kNothing = 1.0f / 255;  // alpha that 8 bits do not show
+constexpr float kNothing = 1.0f / 255;  // alpha invisible at 8 bits
 
 bool IsWhole(const PixelBox& window, const Pinhole& size) { return window == PixelBox{0, 0, size.width, size.height}; }
 
@@ -21,7 +21,7 @@ bool IsWhole(const PixelBox& window, const Pinhole& size) { return window == Pix
 Buffer<uint8_t> FaintPixels(const Image& alpha) {
   const int width = alpha.width, height = alpha.height;
   Buffer<uint8_t> faint(static_cast<size_t>(alpha.plane()));
-  // Rows first: is there something solid within reach along the row?
+  // Horizontal pass: solid pixels within reach along the row.
   Buffer<uint8_t> solid(faint.size());
   ParallelFor(0, height, kTargetRowsPerTask, [&](int64_t first, int64_t last) {
     for (int64_t y = first; y < last; ++y) {

@@ -17,20 +17,19 @@
 
 namespace anchorsplat {
 
-// What a low-resolution view should show.
+// Target picture of a low-resolution view.
 struct RefineTarget {
   Image picture;            // [3,H,W] of the window
-  Buffer<uint8_t> ignored;  // [H,W] 1 where nothing is asked, as masks have it; empty: nowhere
+  Buffer<uint8_t> ignored;  // [H,W] 1 = no target, as in masks; empty: none ignored
 };
 
-// The views that a refinement compares with: pictures, or what a splat itself shows through cameras, rendered in the
-// ordinary way. In the latter, haze is ignored: pixels with an alpha below kFaint around which (kFaintReach pixels)
-// none is above it. Whether that is a floater or a remnant of something, there is no detail in it to find. Pixels
-// without any alpha count: they keep the object from growing.
+// Target views of a refinement: pictures, or ordinary renders of a splat. In renders, haze is ignored: pixels with
+// alpha below kFaint and no pixel above it within kFaintReach. Be it a floater or a remnant, there is no detail to
+// find. Pixels with zero alpha count: they keep the object from growing.
 inline constexpr float kFaint = 0.3f;
 inline constexpr int kFaintReach = 2;
 
-// The part `window` of a picture and of what is ignored in it (empty: nothing), which has its size.
+// Copies `window` of a picture and of its ignored pixels (empty: none) to `part`.
 void CutOut(const Image& picture, const Buffer<uint8_t>& ignored, const PixelBox& window, RefineTarget& part);
 
 class EnlargedTargets;
@@ -46,35 +45,34 @@ class RefineTargets {
 
   const std::vector<Camera>& views() const;
 
-  // The part `window`, within the picture, of what views()[view] should show. Errors: those of PictureCache and
-  // Rasterizer.
+  // Loads `window` of the target of views()[view]. Errors: those of PictureCache and Rasterizer.
   Status Load(int64_t view, const PixelBox& window, RefineTarget& target);
 
-  // Those that it has instead of what a splat shows, or null.
+  // The pictures, or null if targets are rendered.
   PictureCache* pictures() { return pictures_ ? &*pictures_ : nullptr; }
 
-  // `views` are asked for next, see PictureCache.
+  // Announces the next views, see PictureCache.
   void LoadAhead(std::span<const int64_t> views);
 
  private:
-  static constexpr int64_t kBudget = int64_t{1} << 30;  // bytes of rendered targets that are kept
+  static constexpr int64_t kBudget = int64_t{1} << 30;  // bytes of cached renders
 
   std::unique_ptr<EnlargedTargets> enlarged_;
   std::optional<PictureCache> pictures_;
   Image whole_;
 
   std::shared_ptr<const GaussianCloud> splat_;
-  std::unique_ptr<ConstantCloud> still_;  // of it
+  std::unique_ptr<ConstantCloud> still_;  // of splat_
   RenderOptions render_;
   std::vector<Camera> views_;
-  std::vector<RefineTarget> kept_;  // of whole pictures; empty ones are not there yet
+  std::vector<RefineTarget> kept_;  // cached whole views; empty: not rendered yet
   int64_t left_ = kBudget;
   Rasterizer rasterizer_;
   RenderOutput output_;
 };
 
-// 1 for pixels with 0 < alpha < kFaint that have no pixel of at least kFaint within kFaintReach rows and columns.
-// Empty when there is none.
+// 1 for pixels with 0 < alpha < kFaint without a pixel of at least kFaint within kFaintReach rows and columns. Empty if
+// there are none.
 Buffer<uint8_t> FaintPixels(const Image& alpha);
 
 }  // namespace anchorsplat

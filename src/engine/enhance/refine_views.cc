@@ -30,7 +30,7 @@ constexpr int64_t kResidualViews = 64;
 constexpr int kCheckAlignSteps = 4;
 constexpr int kHeldOutByDefault = 8;
 constexpr double kSeen = 0.3;     // dB
-constexpr double kPerfect = 100;  // dB that stand for identical pictures in means
+constexpr double kPerfect = 100;  // dB of identical pictures, for means
 
 std::array<float, 3> BackgroundFor(const RefineOptions& options, const std::optional<std::array<float, 3>>& of_cameras,
                                    const GaussianCloud& cloud) {
@@ -38,7 +38,7 @@ std::array<float, 3> BackgroundFor(const RefineOptions& options, const std::opti
   return of_cameras.value_or(BackgroundOf(cloud.comments).value_or(std::array<float, 3>{}));
 }
 
-// Views that a fit has seen agree with it as well as others do, those that it has not less.
+// Whether a fit was trained on the held-out views too: they match as well as the others.
 bool HasSeen(double seen_psnr, double held_out_psnr) { return held_out_psnr > seen_psnr - kSeen; }
 
 Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& options, RenderOptions render) {
@@ -66,7 +66,7 @@ Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& 
       ANCHORSPLAT_ASSIGN_OR_RETURN(
           TrainingViews all,
           OpenProject(options.images, {.hold_out = 0, .downscale = options.downscale, .origin = options.origin}));
-      // A project with test views of its own has them held out for good.
+      // A project with its own test views always holds those out.
       if (all.held_out.empty()) {
         LogInfo(Cat("training on all views: the splat was fitted to the held-out ones, too (they match with ",
                     Fixed(others.psnr, 2), " dB). --hold-out N holds some out"));
@@ -77,8 +77,8 @@ Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& 
   }
   const auto& check = project.held_out.empty() ? project.train : project.held_out;
   return RefineViews{RefineTargets(std::move(pictures)),
-                     RefineTargets(PictureCache(Thinned(check, kCheckViews), render.background)), agreement.psnr,
-                     project.scene_scale, render};
+                     RefineTargets(PictureCache(SubsampleEvenly(check, kCheckViews), render.background)),
+                     agreement.psnr, project.scene_scale, render};
 }
 
 Result<RefineViews> OpenSplat(const RefineInput& input, const RefineOptions& options, RenderOptions render) {
@@ -134,7 +134,7 @@ Result<Consistency> MeasureConsistency(const GaussianCloud& cloud, double upscal
   const auto count = static_cast<int64_t>(targets.views().size());
   for (int64_t view = 0; view < count; ++view) {
     const Camera& camera = targets.views()[static_cast<size_t>(view)];
-    const PixelBox window = ChooseWindow(camera, input, 0, view);  // the same for whatever is measured
+    const PixelBox window = ChooseWindow(camera, input, 0, view);  // equal for every cloud measured
     ANCHORSPLAT_RETURN_IF_ERROR(targets.Load(view, window, target));
     Camera seen = Crop(camera, window);
     const ObjectiveOptions as_seen{.render = views.render, .loss = {}, .pixel = AreaModel(upscale)};
@@ -161,7 +161,7 @@ Result<Consistency> MeasureConsistency(const GaussianCloud& cloud, double upscal
     ANCHORSPLAT_ASSIGN_OR_RETURN(const double psnr, Psnr(shown, target.picture));
     sum.psnr += std::min(psnr, kPerfect);
     const Result<double> ssim = Ssim(shown, target.picture);
-    sum.ssim += ssim.ok() ? *ssim : 0;  // too small for a window
+    sum.ssim += ssim.ok() ? *ssim : 0;  // 0 if too small for its window
   }
   if (count == 0) return Consistency{};
   return Consistency{sum.psnr / static_cast<double>(count), sum.ssim / static_cast<double>(count)};

@@ -13,7 +13,7 @@
 
 namespace anchorsplat {
 
-// The views to compare with, and others to see whether it helped.
+// Target views, and held-out views to check the result.
 struct RefineViews {
   RefineTargets train, check;
   std::optional<double> input_psnr;
@@ -21,22 +21,20 @@ struct RefineViews {
   RenderOptions render;
 };
 
-// Those that `options` and `input` name: pictures, cameras, or places around the splat. Errors: see Refine.
+// Opens the views that `options` and `input` name: pictures, cameras, or poses around the splat. Errors: see Refine.
 Result<RefineViews> OpenRefineViews(const RefineInput& input, const RefineOptions& options);
 
-// The same views `factor` times larger, enlarged by the network in `file`, which can do that (CheckFactor of
-// enhance/enlarged_targets.h). `start`: what is about to be refined. Errors: those of Upscaler::Read.
+// Replaces the views by ones `factor` times larger, enlarged by the network in `file` (see CheckFactor in
+// enhance/enlarged_targets.h). `start`: the splat to refine. Errors: those of Upscaler::Read.
 Status EnlargeViews(const std::filesystem::path& file, int factor, const GaussianCloud& start, RefineViews& views);
 
-// How well `cloud`, seen closer and averaged down, agrees with views.check, means over the views. `input` is the splat
-// that is refined. Pictures that may differ in brightness, or whose poses may be off (`options`), are measured where
-// and as bright as they agree with `cloud` best.
+// Mean agreement of `cloud`, rendered closer and averaged down, with views.check. `input`: the splat being refined.
+// With exposure or alignment in `options`, each picture is first adjusted to match `cloud` best.
 Result<Consistency> MeasureConsistency(const GaussianCloud& cloud, double upscale, const GaussianCloud& input,
                                        const RefineOptions& options, RefineViews& views);
 
-// What every Gaussian has to do with what the views find wrong: Σ over up to kResidualViews views and their pixels of
-// its weight in the pixel × how far the picture is off there, 0–1. That weight is how the picture depends on its
-// colour.
+// Share of each Gaussian in the error of up to kResidualViews views: Σ over pixels of its blending weight × absolute
+// error (0–1). The weight is the derivative of the pixel by the Gaussian's colour.
 Result<std::vector<double>> Residuals(const GaussianCloud& cloud, double upscale, RefineViews& views);
 
 }  // namespace anchorsplat

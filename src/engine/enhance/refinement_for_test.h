@@ -21,11 +21,11 @@
 namespace anchorsplat {
 
 inline constexpr int kSide = 28, kUpscale = 3;
-inline constexpr double kGoodFit = 40;                              // dB that a splat that is fine comes to the truth
-inline constexpr double kPixel = 1.7 / (0.5 * kSide / 0.41421356);  // at the middle of the scene
+inline constexpr double kGoodFit = 40;                              // dB of a good splat against the truth
+inline constexpr double kPixel = 1.7 / (0.5 * kSide / 0.41421356);  // at the scene's centre
 
-// A splat that is right when seen three times closer; a project with what a camera sees of it; and what a fit makes of
-// those pictures: eroded, a little wrong.
+// A splat that is right at three times the resolution (truth_), a project with camera pictures of it, and the splat
+// that a fit makes of those pictures: eroded and slightly wrong.
 class Refinement : public testing::Test {
  protected:
   void SetUp() override {
@@ -68,7 +68,7 @@ class Refinement : public testing::Test {
 
   std::filesystem::path project() const { return folder_ / "project"; }
 
-  // How far from the truth a cloud is when seen closer, from where nobody was.
+  // PSNR against the truth from new poses at the higher resolution.
   double PsnrCloser(const GaussianCloud& cloud) const {
     Rasterizer rasterizer;
     RenderOutput a, b;

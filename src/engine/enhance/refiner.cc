@@ -17,11 +17,11 @@ namespace anchorsplat {
 
 namespace {
 
-// Of full scale, what detail that is still missing may differ by; in the beginning, when everything may be wrong,
-// nothing is an outlier.
+// Smallest error that counts as an outlier, so that missing detail does not; and when outliers are first rejected: at
+// the beginning everything may be wrong.
 constexpr double kLeastOutlier = 0.1, kTrustFrom = 0.3;
-constexpr int kFirstSteps = 3;  // of alignment, when a view is seen for the first time
-constexpr int kTries = 16;      // for a Gaussian that the camera sees
+constexpr int kFirstSteps = 3;  // alignment steps when a view is first visited
+constexpr int kTries = 16;      // attempts to find a Gaussian in the view
 
 LearningRates Scaled(LearningRates rates, double factor) {
   for (double* rate : {&rates.means, &rates.scales, &rates.opacities, &rates.quats, &rates.sh0, &rates.sh_rest}) {
@@ -30,7 +30,7 @@ LearningRates Scaled(LearningRates rates, double factor) {
   return rates;
 }
 
-// The last rows of `cloud` become those of `fixed`.
+// Resets the last rows of `cloud` to `fixed`.
 void PutBack(const GaussianCloud& fixed, GaussianCloud& cloud) {
   const auto copy = [](const Buffer<float>& from, Buffer<float>& to) {
     std::copy(from.begin(), from.end(), to.end() - std::ssize(from));
@@ -87,7 +87,7 @@ Result<Refiner> Refiner::Begin(const RefineOptions& options, const RefineProblem
   if (targets.views().empty()) return Error{ErrorCode::kBadArgument, "refine: there are no views to compare with"};
   if (state.cloud.empty()) return Error{ErrorCode::kBadArgument, "refine: there are no Gaussians"};
   Refiner refiner(options, problem, std::move(targets), std::move(state));
-  if (!options.align) refiner.residence_.MoveIn(refiner.state_);
+  if (!options.align) refiner.residence_.MoveToGpu(refiner.state_);
   return refiner;
 }
 
@@ -98,25 +98,28 @@ Refiner::Refiner(const RefineOptions& options, const RefineProblem& problem, Ref
       state_(std::move(state)),
       order_(static_cast<int64_t>(targets_.views().size()), problem.seed) {}
 
-int64_t Refiner::size() const { return residence_.away() != nullptr ? residence_.away()->size() : state_.cloud.size(); }
+int64_t Refiner::size() const {
+  return residence_.resident() != nullptr ? residence_.resident()->size() : state_.cloud.size();
+}
 
 FitState& Refiner::state() {
-  if (residence_.away() != nullptr) {
-    if (const Status copied = residence_.CopyHome(state_); !copied.ok()) residence_.MoveOut(state_, copied.error());
+  if (residence_.resident() != nullptr) {
+    if (const Status copied = residence_.CopyToHost(state_); !copied.ok())
+      residence_.MoveToHost(state_, copied.error());
   }
   return state_;
 }
 
-bool Refiner::MoveOut() {
-  if (residence_.away() == nullptr) return true;
-  const Status home = residence_.MoveOut(state_);
-  return home.ok() || residence_.MoveOut(state_, home.error());
+bool Refiner::MoveToHost() {
+  if (residence_.resident() == nullptr) return true;
+  const Status home = residence_.MoveToHost(state_);
+  return home.ok() || residence_.MoveToHost(state_, home.error());
 }
 
-// Where nothing is to be learned the target becomes what is there.
+// Copies the render into the target where it is ignored.
 void Refiner::AdjustTarget(const Image& rendered, double done) {
   Image& picture = target_.picture;
-  FillIgnored(target_.ignored, rendered, picture);  // which are not to weigh in what follows
+  FillIgnored(target_.ignored, rendered, picture);  // so that they have no effect below
   if (options_.exposure) {
     const auto exposure = EstimateExposure(rendered, picture);
     if (exposure.ok()) RemoveExposure(*exposure, picture);
@@ -128,7 +131,7 @@ void Refiner::AdjustTarget(const Image& rendered, double done) {
   FillIgnored(target_.ignored, rendered, picture);
 }
 
-// Where the view's picture was taken, as far as the candidate says now: a step nearer than the last time.
+// The view's camera after one more alignment step.
 Result<Camera> Refiner::AlignedView(int64_t view, const PixelBox& window) {
   Buffer<float>& motions = state_.motions;
   const Camera& origin = targets_.views()[static_cast<size_t>(view)];
@@ -139,13 +142,13 @@ Result<Camera> Refiner::AlignedView(int64_t view, const PixelBox& window) {
     std::copy_n(motion, 6, at.begin());
     return Moved(origin, at);
   };
-  if (!target_.ignored.empty()) {  // what a mask leaves out pulls at no pose
+  if (!target_.ignored.empty()) {  // masked pixels must not affect the pose
     ANCHORSPLAT_RETURN_IF_ERROR(objective_.Show({.render = problem_.render, .loss = {}, .pixel = {1, problem_.upscale}},
                                                 state_.cloud, Crop(placed(), window)));
     FillIgnored(target_.ignored, objective_.rendered(), target_.picture);
   }
   const bool first_time = state_.step < static_cast<int64_t>(targets_.views().size());
-  // One ray per pixel tells well enough where things are.
+  // One ray per pixel is accurate enough for alignment.
   ANCHORSPLAT_ASSIGN_OR_RETURN(
       const Camera found,
       aligner_.Align(state_.cloud, RaysOf(PixelModel{1, problem_.upscale}, problem_.render), Crop(origin, window),
@@ -155,10 +158,10 @@ Result<Camera> Refiner::AlignedView(int64_t view, const PixelBox& window) {
   return placed();
 }
 
-Result<PixelBox> Refiner::WindowAway(const Camera& view) {
+Result<PixelBox> Refiner::WindowOnGpu(const Camera& view) {
   const std::vector<int64_t> rows = RowsForWindow(view, size(), problem_.seed, state_.step);
   if (rows.empty()) return WindowAround(view, {});
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud there, residence_.away()->ReadRows(rows));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud there, residence_.resident()->ReadRows(rows));
   return WindowAround(view, there.means);
 }
 
@@ -174,11 +177,11 @@ Result<FitStep> Refiner::Step(double done) {
   objective.pixel = PixelModelAt({problem_.upscale, options_.half_from, options_.all_from}, done);
   const LearningRates rates = Scaled(LearningRates(), options_.rate.value_or(1) * std::pow(options_.rate_decay, done));
   targets_.LoadAhead(order_.From(step));
-  if (residence_.away() != nullptr) {
-    const Result<PixelBox> window = WindowAway(view);
-    const Status learned = window.ok() ? LearnAway(objective, rates, out.view, *window, done) : Status(window.error());
+  if (residence_.resident() != nullptr) {
+    const Result<PixelBox> window = WindowOnGpu(view);
+    const Status learned = window.ok() ? LearnOnGpu(objective, rates, out.view, *window, done) : Status(window.error());
     if (!learned.ok()) {
-      if (!residence_.MoveOut(state_, learned.error())) return out;  // `done` is of a later step
+      if (!residence_.MoveToHost(state_, learned.error())) return out;  // `done` belongs to a later step
       return Step(done);
     }
   } else {
@@ -193,7 +196,7 @@ Result<FitStep> Refiner::Step(double done) {
     ANCHORSPLAT_RETURN_IF_ERROR(Learn(objective, rates, camera, done));
   }
   ++state_.step;
-  if (residence_.away() != nullptr && Residence::IsCopyDue(state_.step)) state();
+  if (residence_.resident() != nullptr && Residence::IsCopyDue(state_.step)) state();
   return out;
 }
 
@@ -210,10 +213,10 @@ Status Refiner::Learn(const ObjectiveOptions& objective, const LearningRates& ra
   return {};
 }
 
-Status Refiner::LearnAway(const ObjectiveOptions& objective, const LearningRates& rates, int64_t view,
-                          const PixelBox& window, double done) {
+Status Refiner::LearnOnGpu(const ObjectiveOptions& objective, const LearningRates& rates, int64_t view,
+                           const PixelBox& window, double done) {
   Stopwatch watch;
-  ResidentFit& fit = *residence_.away();
+  ResidentFit& fit = *residence_.resident();
   GpuObjective& shown = fit.objective();
   const Camera& camera = targets_.views()[static_cast<size_t>(view)];
   const bool whole = window == PixelBox{0, 0, camera.intrinsics.width, camera.intrinsics.height};
@@ -260,8 +263,8 @@ FitTimes Refiner::times() const {
 }
 
 double Refiner::LastPsnr() {
-  if (residence_.away() != nullptr) {
-    const auto loss = residence_.away()->objective().Loss();
+  if (residence_.resident() != nullptr) {
+    const auto loss = residence_.resident()->objective().Loss();
     return loss.ok() ? -10 * std::log10(loss->mean_square) : 0;
   }
   const auto psnr = Psnr(objective_.rendered(), target_.picture);

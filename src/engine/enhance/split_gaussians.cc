@@ -81,7 +81,7 @@ std::vector<int> CopiesByResidual(std::span<const double> residuals, int copies,
     }
     return sum;
   };
-  // Bisection: the total grows with the factor.
+  // Bisection: the total increases with the factor.
   double largest = 0;
   for (const double residual : residuals) largest = std::max(largest, residual);
   if (!(largest > 0) || !std::isfinite(largest)) return each;

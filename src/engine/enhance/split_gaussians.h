@@ -9,29 +9,25 @@
 
 namespace anchorsplat {
 
-// Every Gaussian becomes `copies` smaller ones that together stand for it, so that an optimisation has something to
-// draw detail with. They lie at random places within it, normally distributed with `spread` of its standard deviations
-// along its axes, and all axes are shorter by √copies to the power of `shrink`. Opacity and colours stay.
+// Splits every Gaussian into `copies` smaller ones, so that optimisation can form detail. Positions are normally
+// distributed with `spread` of its standard deviations along its axes; axes are divided by √copies^shrink. Opacity and
+// colours are copied. This looks worse than the original until a few steps have been made.
 //
-// With `each`, Gaussian i becomes each[i] instead, whose axes are shorter by √each[i] to the same power; one stays as
-// it is.
-//
-// What they show at first is worse than the original; after some steps it is better.
+// With `each`, Gaussian i is split into each[i] copies by the same rule; 1 leaves it unchanged.
 struct SplitOptions {
   int copies = 4;  // K ≥ 1
   double spread = 0.7;
   double shrink = 0.8;
   uint64_t seed = 0;
-  std::span<const int> each = {};  // [N], ≥ 1; empty: `copies` of all
+  std::span<const int> each = {};  // [N], ≥ 1; empty: `copies` for all
 };
 
-// The copies of row i stand behind those of row i − 1. kBadArgument: copies below 1 or more than 2^31 rows, a number of
-// `each` that is not that of the Gaussians, a negative spread or shrink.
+// Copies of row i follow those of row i − 1. Errors (kBadArgument): copies below 1, or over 2^31 rows; `each` of the
+// wrong length; negative spread or shrink.
 Result<GaussianCloud> SplitGaussians(const GaussianCloud& cloud, const SplitOptions& options);
 
-// How many copies each Gaussian is to have, `all` together or, where bounds forbid it, nearly so: in proportion to
-// the square root of its `residual` (≥ 0), at least 1 and at most kMostShare · copies. Where what is there is right
-// already, more Gaussians have nothing to draw.
+// Distributes `all` copies (nearly, if limits interfere) over Gaussians in proportion to the square root of their
+// residuals (≥ 0), from 1 to kMostShare · copies each. More copies do not help where the splat is already right.
 inline constexpr int kMostShare = 4;
 std::vector<int> CopiesByResidual(std::span<const double> residuals, int copies, int64_t all);
 

@@ -31,11 +31,11 @@ constexpr int kMostCleanPixels = 512;  // a side
 constexpr int kOrbitViews = 24;
 constexpr int kPredictingViews = 8, kPredictingPixels = 128;
 constexpr double kPredictedPsnr = 75;
-constexpr double kReachesViews = 0.01;  // of the squares that it would have with nothing in front of it
+constexpr double kReachesViews = 0.01;  // of its unoccluded footprint
 constexpr int kMostTrials = 10;
 constexpr int64_t kRowsAtOnce = 1 << 14;
-constexpr double kCloseEnough = 0.01;  // of the number that go
-// α is capped at 0.999, where no gradient flows. Opacities are lowered below that while gradients are taken.
+constexpr double kCloseEnough = 0.01;  // relative tolerance of the number removed
+// α is capped at 0.999, where gradients vanish. So opacities are limited while gradients are computed.
 constexpr float kHighestOpacity = 0.98f;
 
 Result<std::vector<Camera>> ViewsAround(const GaussianCloud& cloud, int count, int pixels) {
@@ -69,7 +69,7 @@ bool IsLikeBackground(const float* constant_term, const std::array<float, 3>& ba
   return true;
 }
 
-// Usable Gaussians of the background's colour, ascending. `constant_terms`: one of each in every `stride` floats.
+// Rows of usable Gaussians with the background's colour, ascending. `constant_terms`: SH DC, [3] every `stride` floats.
 std::vector<int64_t> RowsLikeBackground(const GaussianCloud& cloud, const Buffer<float>& constant_terms, int64_t stride,
                                         const std::array<float, 3>& background) {
   std::vector<std::vector<int64_t>> parts(static_cast<size_t>((cloud.size() + kRowsAtOnce - 1) / kRowsAtOnce));
@@ -86,14 +86,14 @@ std::vector<int64_t> RowsLikeBackground(const GaussianCloud& cloud, const Buffer
 
 Error Stopped() { return Error{ErrorCode::kInterrupted, "stopped while cleaning"}; }
 
-// Of some Gaussians, over the pixels of the views: in squares, by the gradient of the picture times random signs.
+// Contributions of some Gaussians to the views, from gradients of the picture with random signs.
 struct Shown {
-  std::vector<double> additions;   // Σ (T·α·(its colour − what is behind it))²; negative where no view draws it
+  std::vector<double> additions;   // Σ (T·α·(its colour − what is behind it))²; negative if no view draws it
   std::vector<double> reaches;     // Σ (T·α)²; 0 where its colour is clamped
-  std::vector<double> footprints;  // Σ o² over its ellipse: about what `reaches` is without anything before it
-  bool anything = false;           // whether a view draws some Gaussian, of these or another
+  std::vector<double> footprints;  // Σ o² over its ellipse: about `reaches` without occlusion
+  bool anything = false;           // whether a view draws any Gaussian
 
-  // Of footprint: that little of it gets through to the views.
+  // Whether it is almost entirely occluded in the views.
   bool IsHidden(size_t k) const { return !(reaches[k] > kReachesViews * footprints[k]); }
 };
 
@@ -125,14 +125,14 @@ Result<Shown> FindShown(CloudView cloud, const std::vector<int64_t>& rows, const
         const int64_t i = rows[k];
         const int32_t* radii = gradient.radii.data() + 2 * i;
         if (radii[0] <= 0) continue;
-        // The sum of sign·T·α·(colour − behind) over the pixels.
+        // Σ over pixels of sign·T·α·(colour − behind).
         const double sum = gradient.OfLogOpacity(i);
         shown.additions[k] = std::max(shown.additions[k], 0.0) + sum * sum;
         for (size_t c = 0; c < 3; ++c) {
           const double of_colour = gradient.OfColor(i, c);
           shown.reaches[k] += of_colour * of_colour / 3;
         }
-        // ∫ exp(−r²/σ²) of radii of 3 σ.
+        // ∫ exp(−r²/σ²) up to 3 σ.
         const double opacity = Sigmoid(double{logits[static_cast<size_t>(i)]});
         shown.footprints[k] += opacity * opacity * std::numbers::pi * (radii[0] / 3.0) * (radii[1] / 3.0);
       }
@@ -142,7 +142,7 @@ Result<Shown> FindShown(CloudView cloud, const std::vector<int64_t>& rows, const
   return shown;
 }
 
-// How the views look without some of the Gaussians.
+// Compares views without some of the Gaussians with the full ones.
 class Comparison {
  public:
   static Result<Comparison> Make(const GaussianCloud& cloud, std::vector<Camera> views, const RenderOptions& options) {
@@ -154,7 +154,7 @@ class Comparison {
     return comparison;
   }
 
-  // Of the worst view, dB, without `gone` against all.
+  // PSNR of the worst view without `gone`, dB.
   Result<double> PsnrWithout(std::span<const int64_t> gone) {
     for (const int64_t i : gone) logits_[static_cast<size_t>(i)] = -std::numeric_limits<float>::infinity();
     const Result<double> psnr = WorstPsnr();
@@ -197,7 +197,7 @@ class Comparison {
   Rasterizer rasterizer_;
 };
 
-// Places of what some view draws; those that add least come first.
+// Indices of Gaussians drawn in some view, smallest contribution first.
 std::vector<size_t> Candidates(const Shown& shown) {
   std::vector<size_t> candidates;
   for (size_t k = 0; k < shown.additions.size(); ++k) {
@@ -209,7 +209,7 @@ void SortByAddition(const Shown& shown, std::vector<size_t>& candidates) {
   std::ranges::stable_sort(candidates, {}, [&](size_t k) { return shown.additions[k]; });
 }
 
-// How many of them add up to `most`, were there no more to it than their sum.
+// How many candidates' contributions sum up to `most`, ignoring interactions.
 size_t Predicted(const std::vector<size_t>& candidates, const Shown& shown, double most) {
   double sum = 0;
   size_t count = 0;
@@ -254,7 +254,7 @@ Result<UnseenGaussians> FindUnseen(const GaussianCloud& cloud, const std::vector
   found.psnr = std::numeric_limits<double>::infinity();
   ANCHORSPLAT_ASSIGN_OR_RETURN(Comparison comparison, Comparison::Make(cloud, std::move(views), render));
   size_t enough = 0, too_many = candidates.size() + 1;
-  // What all views together would allow, which is about the most that the worst can.
+  // Initial guess: what all views together allow, about the maximum for the worst view.
   size_t count = Predicted(order, shown, values * std::pow(10, -options.least_psnr / 10));
   Progress progress("verify", kMostTrials);
   for (int trial = 0; trial < kMostTrials && enough + 1 < too_many; ++trial) {
@@ -276,7 +276,7 @@ Result<UnseenGaussians> FindUnseen(const GaussianCloud& cloud, const std::vector
 
 Result<std::vector<int64_t>> PredictUnseen(const GaussianCloud& cloud) {
   constexpr std::array<float, 3> kBlack{};
-  // A little brighter than black, where the gradient tells how much of them reaches the views.
+  // Slightly brighter than black, where the gradient tells how much of each reaches the views.
   Buffer<float> colours(3 * cloud.opacity_logits.size());
   ParallelFor(0, cloud.size(), kRowsAtOnce, [&](int64_t first, int64_t last) {
     for (int64_t i = first; i < last; ++i) {
@@ -295,7 +295,7 @@ Result<std::vector<int64_t>> PredictUnseen(const GaussianCloud& cloud) {
   view.sh = colours;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Shown shown, FindShown(view, dark, views, DisplayOptions(cloud), /*seed=*/0));
   std::vector<size_t> order = Candidates(shown);
-  // Most of a large splat is behind something: it adds nothing to the sum and would go out again below.
+  // Most of a large splat is occluded; such Gaussians add nothing to the sum and would be excluded below anyway.
   std::erase_if(order, [&](size_t k) { return shown.additions[k] == 0 && shown.IsHidden(k); });
   SortByAddition(shown, order);
   double values = 0;

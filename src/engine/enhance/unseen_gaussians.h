@@ -10,37 +10,36 @@
 
 namespace anchorsplat {
 
-// Gaussians that nobody misses over the background that a splat was trained on: black dust and veils around objects on
-// black, which come to light on any other background. They have the background's colour, within kLikeBackground of it
-// in every channel of the constant term, are drawn in some view, and renders of the views without them agree with those
-// with them.
+// Gaussians that cannot be seen over the training background, such as black dust and veils around objects on black,
+// which show on any other background. They have the background's colour (SH DC within kLikeBackground per channel), are
+// drawn in some view, and removing them does not visibly change the views.
 //
-// Of dark parts of an object on black the pictures say as little: they go, too, where nothing bright is behind them.
+// This includes dark parts of an object on black with nothing bright behind them: pictures cannot tell them apart.
 struct UnseenOptions {
   std::array<float, 3> background{};  // rgb 0–1, of the training views
-  double least_psnr = 50;             // dB of every view, between the renders with and without them
+  double least_psnr = 50;             // dB, in every view, of renders without them against renders with them
   uint64_t seed = 0;
 };
 inline constexpr float kLikeBackground = 0.1f;
 
 struct UnseenGaussians {
   std::vector<int64_t> rows;  // ascending
-  double psnr = 0;            // of the worst view, without them against with them; +Inf where no pixel changes
-  int64_t views = 0;          // that were looked at: at most 48, of at most 512 pixels a side
+  double psnr = 0;            // of the worst view, without against with them; +Inf if no pixel changes
+  int64_t views = 0;          // views compared: at most 48, of at most 512 pixels a side
 };
 
-// Of `cameras`, or of views all around where there are none. What a Gaussian adds to a picture, T·α·(its colour − what
-// is behind it) summed in squares over the pixels, comes of one gradient per view with random signs: its expectation is
-// that sum. Those that add least are taken out, as many as least_psnr allows, within a hundredth. Memory: what blending
-// finds of the cloud, one picture's gradient, and the pictures. Shows progress.
-// Errors: those of Rasterizer; kBadArgument: least_psnr is not positive, the background is not from 0 to 1, no view
-// shows anything; kInterrupted: the user stopped it.
+// Searches in the views of `cameras`, or in views all around if there are none. A Gaussian's contribution to a picture
+// is Σ over pixels of (T·α·(its colour − what is behind it))². One gradient per view with random signs gives it in
+// expectation. Removes the smallest contributions, as many as least_psnr allows, within a hundredth. Memory: the
+// blending state of the cloud, one picture's gradient, and the pictures. Shows progress.
+// Errors: those of Rasterizer; kBadArgument: least_psnr not positive, background not in 0–1, no view shows anything;
+// kInterrupted: the user stopped it.
 Result<UnseenGaussians> FindUnseen(const GaussianCloud& cloud, const std::vector<Camera>& cameras,
                                    const UnseenOptions& options);
 
-// The same without trying: rows, ascending, of those that by the sum of what each adds leave 75 dB over black in a few
-// small views from all around. Those that hardly reach a view, for what is in front of them, are none: what is inside
-// a room is not seen from outside. A tenth of a second for 20,000 Gaussians.
+// Predicts such rows, ascending, without verifying: those whose summed contributions leave 75 dB over black in a few
+// small views all around. Excludes Gaussians that are mostly occluded, as the inside of a room is from outside. Takes a
+// tenth of a second for 20,000 Gaussians.
 // Errors: those of Rasterizer; kInterrupted.
 Result<std::vector<int64_t>> PredictUnseen(const GaussianCloud& cloud);
 

@@ -33,12 +33,12 @@ namespace anchorsplat {
 namespace {
 HWY_EXPORT(UpdateRuns);
 
-constexpr int64_t kChunkNumbers = 1 << 15;  // per task: half a megabyte of the four arrays, some 10 µs
+constexpr int64_t kChunkNumbers = 1 << 15;  // per task: half a megabyte in four arrays, some 10 µs
 }  // namespace
 
 void AdamStep(const AdamParams& p) {
   if (p.rows <= 0 || p.columns <= 0) return;
-  // Whole rows are one run with a repeating pattern of rates; parts of rows are a run each.
+  // Whole rows form one run with a repeating pattern of rates; partial rows are one run each.
   const bool whole = p.columns == p.stride;
   const int64_t period = AdamPeriod(p.columns);
   std::vector<float> rates(static_cast<size_t>(period));

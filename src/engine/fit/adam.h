@@ -4,15 +4,15 @@
 
 namespace anchorsplat {
 
-// One Adam step (Kingma & Ba 2015, with PyTorch's place for ε) on rows of numbers:
+// One Adam step (Kingma & Ba 2015, with ε placed as in PyTorch) on rows of numbers:
 //     m ← m + (1 − β₁)(g − m),   v ← β₂ v + (1 − β₂) g²,   x ← x − rate/(1 − β₁ᵗ) · m / (√v/√(1 − β₂ᵗ) + ε).
-// A row may be updated in part, and its first columns may have a rate of their own: spherical harmonics of all degrees
-// lie in one row, the constant one learns twenty times faster, and those of a degree that is not in use yet stay.
+// May update only the first columns of each row, and the very first at a rate of their own: SH of all degrees share a
+// row, where the DC learns twenty times faster and degrees not in use yet stay.
 struct AdamParams {
   int64_t rows;           // N
   int64_t stride;         // numbers per row
-  int64_t columns;        // of each row that are updated, the first ones; ≤ stride
-  int64_t first_columns;  // of these that learn at `first_rate`, the others at `rate`
+  int64_t columns;        // updated columns per row, the first ones; ≤ stride
+  int64_t first_columns;  // of these, columns at `first_rate`; the others at `rate`
   float first_rate;       // ≥ 0
   float rate;             // ≥ 0
   double beta1, beta2;    // in [0, 1)
@@ -25,7 +25,7 @@ struct AdamParams {
   float* values;         // [N,stride] x
 };
 
-// Every number is updated by itself: the same bits for any number of threads.
+// Updates each number independently: the same bits for any number of threads.
 void AdamStep(const AdamParams& p);
 
 }  // namespace anchorsplat

@@ -27,14 +27,13 @@ bool SamePlace(const fs::path& a, const fs::path& b) {
   return AbsoluteName(a) == AbsoluteName(b) || fs::equivalent(a, b, code);
 }
 
-// A text that tells nobody anything.
+// Fingerprints mean nothing to users and are not shown.
 bool IsFingerprint(const nlohmann::json& value) {
   return value.is_string() && value.get_ref<const std::string&>().size() == Fingerprint().text().size() &&
          value.get_ref<const std::string&>().find_first_not_of("0123456789abcdef") == std::string::npos;
 }
 
-// Settings as the command line and Python call them. Others follow from these, which are therefore compared first;
-// those in front change what those behind are by default.
+// Settings with their option names. Compared in this order: earlier options change the defaults of later ones.
 constexpr std::pair<std::string_view, std::string_view> kOptions[] = {
     {"steps", "--steps"},
     {"seed", "--seed"},
@@ -56,19 +55,19 @@ constexpr std::pair<std::string_view, std::string_view> kOptions[] = {
     {"min_opacity", "--min-opacity"},
 };
 
-// The setting's own name where the command line has no word for it.
+// The option's name, or the setting's own if there is no option.
 std::string Spoken(const std::string& key) {
   const auto found = std::ranges::find(kOptions, key, &std::pair<std::string_view, std::string_view>::first);
   return std::string(found == std::end(kOptions) ? std::string_view(key) : found->second);
 }
 
-// A value as it is asked for: that of --exposure is the step from which on it works, and negative without it.
+// The value as the user would give it: --exposure is stored as its first step, negative if off.
 std::string SpokenValue(const std::string& key, const nlohmann::json& value) {
   if (key != "exposure_from" || !value.is_number()) return Printable(value.dump());
   return value.get<double>() < 0 ? "off" : Cat("on from step ", value.dump());
 }
 
-// --strategy absgrad is the default strategy with other gradients.
+// "--strategy absgrad" is the default strategy with absgrad set.
 nlohmann::json WithPreset(nlohmann::json settings) {
   if (settings.is_object() && settings.value("strategy", nlohmann::json()) == "default" &&
       settings.value("absgrad", nlohmann::json()) == true) {
@@ -96,7 +95,7 @@ Status CompareSettings(const std::string& file, const std::string& theirs, const
       return Error{ErrorCode::kBadArgument,
                    Cat(file, ": is a checkpoint of another run: its ", Spoken(key), " is ", how)};
     }
-    // Only fits with a far shell say how far it is, and their start differs from others': that has been said.
+    // Only fits with a far shell have these; that difference was already reported through the start.
     for (const auto& [key, value] : b.items()) {
       if (a.contains(key)) continue;
       return Error{ErrorCode::kBadFile, Cat(file, ": is a checkpoint of another version, which knew no ", key)};
@@ -114,7 +113,7 @@ Status CheckCheckpoint(const fs::path& checkpoint, std::span<const fs::path> out
     }
   }
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(checkpoint));
-  if (!Exists(checkpoint) || resume) return {};  // what a checkpoint is, reading it shows
+  if (!Exists(checkpoint) || resume) return {};  // reading it will check what it is
   if (!(is_checkpoint ? is_checkpoint : IsFitCheckpoint)(checkpoint)) {
     return Error{ErrorCode::kExists,
                  Cat(checkpoint.string(), " exists and is not a checkpoint; pass another file with --checkpoint")};

@@ -12,7 +12,7 @@ namespace {
 
 enum Attribute : size_t { kMeans, kScales, kQuats, kOpacities, kSh };
 
-// Makes the step from `before` to `means` [N,3] as much longer as lengths are where it began.
+// Scales the step from `before` to `means` [N,3] by the length factor at its start.
 void Lengthen(const FarUnits& far, const Buffer<float>& before, Buffer<float>& means) {
   ParallelFor(0, static_cast<int64_t>(means.size()) / 3, 4096, [&](int64_t begin, int64_t end) {
     for (auto i = static_cast<size_t>(3 * begin); i < static_cast<size_t>(3 * end); i += 3) {

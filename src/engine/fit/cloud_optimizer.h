@@ -12,7 +12,7 @@
 
 namespace anchorsplat {
 
-// Step lengths of Kerbl et al. 2023 as gsplat's trainer has them, and Adam's constants.
+// Learning rates of Kerbl et al. 2023 as in gsplat's trainer, and Adam's constants.
 struct LearningRates {
   double means = 1.6e-4;  // × scene scale; decays to `means_decay` of it at the last step
   double means_decay = 0.01;
@@ -24,41 +24,40 @@ struct LearningRates {
   double beta1 = 0.9, beta2 = 0.999, epsilon = 1e-15;
 };
 
-// The rate of the means at step t (0, 1, …) of `steps`: exponential decay.
+// Learning rate of the means at step t (0, 1, …) of `steps`: exponential decay.
 double MeansRate(const LearningRates& rates, double scene_scale, int64_t step, int64_t steps);
 
-// How the rows of a cloud change when Gaussians come and go: first the old rows that stay, in this order, then new
-// ones.
+// How rows change when Gaussians are added and removed: kept old rows in order, then new ones.
 struct RowChange {
   Buffer<int64_t> kept;  // old row numbers, ascending
-  int64_t fresh = 0;     // rows appended behind them
-  bool any = false;      // false: all rows stay and none comes
+  int64_t fresh = 0;     // number of rows appended
+  bool any = false;      // false: nothing changes
 };
 
-// An Adam per attribute of a cloud. The moments follow the Gaussians through densification; new ones begin at zero
-// while the count of steps goes on, as in gsplat.
+// Adam for each attribute of a cloud. Moments follow Gaussians through densification. As in gsplat, those of new
+// Gaussians start at zero while the step count continues.
 class CloudOptimizer {
  public:
   CloudOptimizer() = default;
   explicit CloudOptimizer(const GaussianCloud& cloud);
 
-  // One step along −gradient. `means_rate` is that of this step; SH coefficients above `sh_degree` stay.
+  // One descent step. `means_rate`: for this step. SH coefficients above `sh_degree` stay.
   void Step(const LearningRates& rates, double means_rate, int sh_degree, const CloudGradient& gradient,
             GaussianCloud& cloud);
-  // The same in two parts, for Rasterizer::Backward in between: what it is to do with the coefficients, which changes
-  // nothing yet, and then the step of everything else.
+  // Step in two parts, around Rasterizer::Backward: BeginStep describes the update of SH coefficients that Backward is
+  // to make, and FinishStep updates everything else.
   CoefficientStep BeginStep(const LearningRates& rates, int sh_degree, GaussianCloud& cloud);
-  // Means move in `far` units.
+  // `far`: scales the steps of means.
   void FinishStep(const LearningRates& rates, double means_rate, const CloudGradient& gradient, GaussianCloud& cloud,
                   const FarUnits& far = {});
 
   void Apply(const RowChange& change);
-  void ForgetOpacities();                          // their moments become zero
-  void ForgetRows(std::span<const int64_t> rows);  // all moments of these Gaussians become zero
+  void ForgetOpacities();                          // zeroes their moments
+  void ForgetRows(std::span<const int64_t> rows);  // zeroes all moments of these Gaussians
 
   int64_t steps() const { return steps_; }
 
-  // For checkpoints: the moments by attribute, shaped like the cloud's arrays.
+  // For checkpoints: moments by attribute, shaped like the cloud's arrays.
   struct Moments {
     std::string_view attribute;
     int64_t width = 0;  // numbers per Gaussian
@@ -76,7 +75,7 @@ class CloudOptimizer {
   int64_t steps_ = 0;
 };
 
-// `values` [N,width] with its rows changed: the kept ones first, then `change.fresh` rows that are not initialised.
+// `values` [N,width] after a row change: kept rows, then `change.fresh` uninitialised ones.
 Buffer<float> ChangeRows(const Buffer<float>& values, int64_t width, const RowChange& change);
 
 }  // namespace anchorsplat

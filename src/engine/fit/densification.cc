@@ -14,11 +14,11 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr float kSplitShrink = 1.6f;  // of Kerbl et al. 2023: halves of a split are this much smaller
+constexpr float kSplitShrink = 1.6f;  // factor by which halves of a split are smaller (Kerbl et al. 2023)
 constexpr int kSplitSamples = 2;
 constexpr int64_t kGaussiansPerTask = 4096;
 
-// In `far` units, which most fits have none of.
+// In `far` units, which are trivial for most fits.
 float LargestLogScale(const FarUnits& far, const GaussianCloud& cloud, int64_t i) {
   const float* s = cloud.log_scales.data() + 3 * i;
   const float largest = std::max({s[0], s[1], s[2]});
@@ -30,18 +30,18 @@ float RevisedLogit(float logit) {
   return LogitFromOpacity(1 - std::sqrt(1 - opacity));
 }
 
-// Who grows.
+// Gaussians that grow.
 struct Growth {
   std::vector<int64_t> duplicate, split;  // rows, ascending
 };
 
-// What is the same for all rows in one refinement.
+// Thresholds of one refinement.
 struct Rules {
   const DensificationOptions* options;
   const FarUnits* far;
-  float log_grow_scale, log_prune_scale;  // ln of world units
+  float log_grow_scale, log_prune_scale;  // ln(world units)
   bool prune_large;                       // after the first reset
-  bool by_radius;                         // the 2-D rules apply
+  bool by_radius;                         // whether the 2-D rules apply
 };
 
 Rules MakeRules(const DensificationOptions& options, const FarUnits& far, int64_t step, double scene_scale) {
@@ -66,7 +66,7 @@ Growth ChooseGrowth(const Rules& rules, const Densification::Gathered& gathered,
       const bool high = gradients[k] > static_cast<float>(options.grow_grad2d);
       const bool small = LargestLogScale(*rules.far, cloud, i) <= rules.log_grow_scale;
       const bool wide = rules.by_radius && gathered.radii[k] > static_cast<float>(options.grow_scale2d);
-      // Both may be true: then it is split, and its duplicate, which has no history, stays whole.
+      // If both hold it is split, and its duplicate, which has no history, stays whole.
       grows[k] = static_cast<uint8_t>((high && small ? kDuplicate : 0) | ((high && !small) || wide ? kSplit : 0));
     }
   });
@@ -120,7 +120,7 @@ std::vector<Newcomer> MakeNewcomers(const Growth& growth, const GaussianCloud& c
   return newcomers;
 }
 
-// Whether a Gaussian of this opacity and size goes.
+// Whether a Gaussian is pruned.
 bool IsPruned(const Rules& rules, bool usable, float logit, float largest_log_scale, float radius) {
   const DensificationOptions& options = *rules.options;
   if (!usable) return true;
@@ -231,7 +231,7 @@ RefinementPlan Densification::Plan(const DensificationOptions& options, int64_t 
           IsPruned(rules, usable[k] != 0, cloud.opacity_logits[k], LargestLogScale(far, cloud, i), gathered_.radii[k]);
     }
   });
-  // Pruning looks at the grown cloud, newcomers included.
+  // Pruning includes newcomers.
   std::erase_if(newcomers, [&](const Newcomer& newcomer) {
     const auto k = static_cast<size_t>(newcomer.source);
     const float logit = cloud.opacity_logits[k], size = LargestLogScale(far, cloud, newcomer.source);

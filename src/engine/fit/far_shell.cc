@@ -20,13 +20,13 @@ namespace {
 
 constexpr size_t kViewsLookedAt = 200;
 constexpr int64_t kPointsLookedAt = 200'000;
-constexpr double kPointsWithin = 0.98;  // lone points of structure from motion lie anywhere
+constexpr double kPointsWithin = 0.98;  // structure from motion leaves lone points anywhere
 constexpr int64_t kFewestOnShell = 500;
 constexpr int kLargestHalfFootprint = 16;  // pixels
 
 using Direction = std::array<double, 3>;
 
-// The sphere and how large the middle is.
+// Geometry of the sphere and of the scene inside.
 struct ShellPlace {
   Direction center{};
   double extent = 0;  // the farther of cameras and points, world units
@@ -57,7 +57,7 @@ std::vector<Camera> ViewsLookedAt(const std::vector<Camera>& views) {
   return chosen;
 }
 
-// As many as stand kShellPixels apart in the middle one of the views.
+// Count with a spacing of kShellPixels in the median view.
 int64_t CountFor(const std::vector<Camera>& views, int64_t max_gaussians) {
   std::vector<float> focal;
   for (const Camera& view : views) {
@@ -69,14 +69,14 @@ int64_t CountFor(const std::vector<Camera>& views, int64_t max_gaussians) {
   return std::min(std::max(wanted, kFewestOnShell), std::max<int64_t>(1, most));
 }
 
-// What one picture has in the place of one of the sphere's Gaussians.
+// Colour of one picture at one Gaussian of the sphere.
 struct ShellSample {
   int64_t place;
   std::array<float, 3> color;
-  bool open;  // no point is there
+  bool open;  // no point in front
 };
 
-void SamplePlaces(const Camera& camera, const LookedAtPicture& picture, const std::vector<Direction>& sphere,
+void SamplePlaces(const Camera& camera, const CellPicture& picture, const std::vector<Direction>& sphere,
                   const ShellPlace& at, std::vector<ShellSample>& samples) {
   const Pinhole& k = camera.intrinsics;
   const double radius = kShellDistance * at.extent;
@@ -96,7 +96,7 @@ void SamplePlaces(const Camera& camera, const LookedAtPicture& picture, const st
   }
 }
 
-// Per channel. Of an even number the mean of the middle two.
+// Median per channel; for an even number the mean of the middle two.
 std::array<float, 3> MedianColor(std::span<const ShellSample> samples, bool open_only) {
   std::array<float, 3> out{};
   std::vector<float> values;
@@ -157,8 +157,8 @@ Result<FarShell> MakeFarShell(const TrainingViews& views, const InitialPoints& s
   }
 
   const std::vector<Camera> looked_at = ViewsLookedAt(views.train);
-  std::vector<LookedAtPicture> pictures(looked_at.size());
-  const InitialPoints points = Thinned(start, kPointsLookedAt);
+  std::vector<CellPicture> pictures(looked_at.size());
+  const InitialPoints points = SubsampleEvenly(start, kPointsLookedAt);
   ParallelFor(0, std::ssize(looked_at), 1, [&](int64_t first, int64_t last) {
     for (auto i = static_cast<size_t>(first); i < static_cast<size_t>(last); ++i) {
       pictures[i].cells = PictureCells(looked_at[i], points.positions);
@@ -173,10 +173,10 @@ Result<FarShell> MakeFarShell(const TrainingViews& views, const InitialPoints& s
   const std::vector<Direction> sphere = FibonacciSphere(count);
   std::vector<std::vector<ShellSample>> of_views(looked_at.size());
   std::vector<Status> read(looked_at.size());
-  // Pictures are read one per thread and forgotten: there may be more than fit into memory.
+  // One picture per thread, freed afterwards: together they may exceed memory.
   ParallelFor(0, std::ssize(looked_at), 1, [&](int64_t first, int64_t last) {
     for (auto i = static_cast<size_t>(first); i < static_cast<size_t>(last); ++i) {
-      read[i] = LookAtPicture(looked_at[i], options.background, pictures[i]);
+      read[i] = ReadCellPicture(looked_at[i], options.background, pictures[i]);
       if (!read[i].ok()) continue;
       SamplePlaces(looked_at[i], pictures[i], sphere, at, of_views[i]);
       pictures[i].Forget();

@@ -9,17 +9,17 @@
 
 namespace anchorsplat {
 
-// What a run that goes on from a checkpoint must have in common with the one that wrote it, besides its options: each
-// as a Fingerprint (core/fingerprint.h), 16 hexadecimal digits.
+// Fingerprints (core/fingerprint.h, 16 hexadecimal digits) of a run's inputs, which must match to resume from a
+// checkpoint.
 
 // All values of all Gaussians.
 std::string FingerprintOf(const GaussianCloud& cloud);
 
-// Poses and intrinsics in their order, and the scale of the scene, on which cameras that are held out have a part.
+// Poses and intrinsics in order, and the scene scale, which also depends on held-out cameras.
 std::string FingerprintOf(const std::vector<Camera>& cameras, double scene_scale);
 
-// The bytes of the cameras' pictures, in the order of the cameras: files of the same name may show something else.
-// Errors: those of MappedFile.
+// The bytes of the cameras' pictures, in order: equally named files may show something else. Errors: those of
+// MappedFile.
 Result<std::string> FingerprintOfPictures(const std::vector<Camera>& cameras);
 
 }  // namespace anchorsplat

@@ -24,9 +24,9 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int64_t kNoteEvery = 20;  // steps: the PSNR of a step costs about as much as one of Adam's arrays
+constexpr int64_t kNoteEvery = 20;  // steps; a step's PSNR costs about as much as Adam on one array
 
-// What a continuation must have in common with the fit that it continues: options, views, start.
+// Settings that must match to resume: options, views, start.
 Result<std::string> Settings(const FitOptions& options, const TrainingViews& views, const GaussianCloud& initial) {
   nlohmann::json json = nlohmann::json::parse(ToJsonText(options));
   json["set of cameras"] = FingerprintOf(views.train, views.scene_scale);
@@ -39,10 +39,10 @@ std::string Note(double psnr, int64_t gaussians) {
   return Cat(Fixed(psnr, 2), " dB, ", WithThousands(gaussians), " Gaussians");
 }
 
-// A mean that follows: single views differ by several dB.
+// Running mean, because single views differ by several dB.
 void Follow(double& mean, double value) { mean = mean == 0 ? value : 0.9 * mean + 0.1 * value; }
 
-// The checkpoint of a fit: what it holds of this fit, and why it does not hold more.
+// The checkpoint of a fit: its latest step, and the error if a newer one could not be written.
 class KeptState {
  public:
   KeptState(const std::filesystem::path& path, std::string settings) : path_(path), settings_(std::move(settings)) {}
@@ -50,7 +50,7 @@ class KeptState {
   std::optional<int64_t> step() const { return step_; }
   void FoundAt(int64_t step) { step_ = step; }
 
-  // A state that cannot be written costs no more than itself: the one before it, if there is one, stays.
+  // A failed write is only a warning; the previous checkpoint, if any, stays.
   void Write(const FitState& state) {
     if (path_.empty() || step_ == state.step) return;
     const Status written = WriteFitCheckpoint(path_, state, settings_);
@@ -71,10 +71,10 @@ class KeptState {
   std::filesystem::path path_;
   std::string settings_;
   std::optional<int64_t> step_;
-  bool warned_ = false;  // once while it goes on
+  bool warned_ = false;  // warns once per failure
 };
 
-// All steps that are left, or as many as there are before the user stops it.
+// Runs the remaining steps, or until the user stops the fit.
 Status MakeSteps(Fitter& fitter, const FitControl& control, KeptState& kept, FitReport& report) {
   Progress progress("fit", fitter.options().steps);
   int64_t shown = fitter.step();
@@ -90,7 +90,7 @@ Status MakeSteps(Fitter& fitter, const FitControl& control, KeptState& kept, Fit
     const int64_t done = fitter.step();
     if (done % kNoteEvery == 0 || fitter.done()) {
       Follow(psnr, fitter.LastPsnr());
-      // Who has lost a GPU makes some steps again.
+      // After losing a GPU some steps are repeated.
       progress.Advance(std::max<int64_t>(0, done - shown), Note(psnr, fitter.size()));
       shown = std::max(shown, done);
     }
@@ -105,7 +105,7 @@ Status MakeSteps(Fitter& fitter, const FitControl& control, KeptState& kept, Fit
   return {};
 }
 
-// Masks may leave nothing of any picture. Where one has none, or at the first pixel that counts, nobody looks further.
+// Fails if masks leave nothing of any picture. Stops at the first unmasked pixel.
 Status CheckSomethingCounts(PictureCache& pictures) {
   const std::vector<Camera>& views = pictures.views();
   if (std::ranges::any_of(views, [](const Camera& view) { return view.photograph.mask.empty(); })) return {};
@@ -132,14 +132,14 @@ Status MeasureQualities(const TrainingViews& views, const FitOptions& options, F
   return {};
 }
 
-// What comes after the steps: the result is brought to safety, then its quality is measured.
+// After the steps: delivers the result, then measures its quality.
 Status Finish(const TrainingViews& views, const FitOptions& options, const FitControl& control, Fitter& fitter,
               KeptState& kept, Fitted& out) {
   if (control.deliver) ANCHORSPLAT_RETURN_IF_ERROR(control.deliver(out));
   if (out.report.interrupted) return {};
   const Status measured = MeasureQualities(views, options, fitter, out);
   if (measured.ok() || measured.error().code != ErrorCode::kInterrupted) return measured;
-  // With all steps done: resumed, it is measured.
+  // Saved with all steps done: resuming then only measures.
   out.report.interrupted = true;
   out.report.train = out.report.held_out = {};
   fitter.Leave(control.outputs);
@@ -148,7 +148,7 @@ Status Finish(const TrainingViews& views, const FitOptions& options, const FitCo
   return {};
 }
 
-// A fit can lose all that it began with: pruned, or faded away.
+// Warns if all Gaussians were pruned or faded away.
 void WarnWhereNothingIsLeft(const Fitted& fitted) {
   constexpr double kNextToNothing = 0.01;
   const auto shows =
@@ -172,7 +172,7 @@ Result<Fitted> Fit(const TrainingViews& views, GaussianCloud initial, const FitO
   report.gaussians_in = initial.size();
   report.scene_scale = views.scene_scale;
   FitState state;
-  bool unfit = false;  // what is there is not this fit's
+  bool unfit = false;  // the existing checkpoint is not this fit's
   if (control.resume && Exists(control.checkpoint)) {
     auto earlier = ReadFitCheckpoint(control.checkpoint, settings);
     if (earlier.ok()) {
@@ -192,7 +192,7 @@ Result<Fitted> Fit(const TrainingViews& views, GaussianCloud initial, const FitO
   ANCHORSPLAT_ASSIGN_OR_RETURN(Fitter fitter,
                                Fitter::Begin(options, PictureCache(views.train, options.objective.render.background),
                                              views.scene_scale, std::move(state)));
-  // A state that was never this fit's, because a picture is damaged perhaps, is not given up for the sake of an error.
+  // Another fit's checkpoint must not be replaced because of an error, such as a damaged picture.
   const auto failed = [&](const Error& error) {
     const FitState& now = fitter.state();
     if (!now.cloud.empty() && now.step > 0 && !(unfit && !kept.step())) kept.Write(now);

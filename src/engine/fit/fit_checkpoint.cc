@@ -26,7 +26,8 @@ namespace anchorsplat {
 namespace {
 
 constexpr const char* kFormat = "anchorsplat fit 4";
-// 1 knew neither its pictures and start nor a checksum, 2 no strategies and no filters, 3 modes by numbers.
+// Format 1 lacked fingerprints of pictures and start and the checksum; 2 lacked strategies and filters; 3 stored modes
+// as numbers.
 constexpr std::array kFormatsBefore = {"anchorsplat fit 1", "anchorsplat fit 2", "anchorsplat fit 3"};
 
 bool IsFormatBefore(const std::string& format) {
@@ -36,24 +37,23 @@ bool IsFormatBefore(const std::string& format) {
 constexpr const char* kMotions = "views.motions";
 constexpr const char* kExposures = "views.exposures";
 
-// An array of the state and what it is called in the file.
+// An array of the state and its name in the file.
 template <typename Array>
 struct Named {
   std::string name;
   std::vector<int64_t> shape;
   Array* values;
-  bool held = true;  // a state need not have it
+  bool held = true;  // false: this state does not have it
 };
 
-// Which file has this name, and whether it has been written to since: a word that another file, or another version of
-// this one, does not have. Empty where there is none.
+// Identifies a version of a file: differs for another file, and after modification. Empty if there is none.
 std::string VersionOf(const std::string& file) {
   struct stat info {};
   if (::stat(file.c_str(), &info) != 0) return "";
   return Cat(info.st_ino, " ", info.st_size, " ", info.st_mtim.tv_sec, ".", info.st_mtim.tv_nsec);
 }
 
-// Every array of a state, in one order for writing and reading. `State` may be const.
+// Every array of a state, in the order of the file. `State` may be const.
 template <typename State, typename Array>
 std::vector<Named<Array>> ArraysOf(State& state, int64_t n, int64_t coefficients) {
   std::vector<Named<Array>> arrays = {{"cloud.means", {n, 3}, &state.cloud.means},
@@ -144,7 +144,7 @@ std::string AbsoluteName(const std::filesystem::path& file) { return Printable(A
 void Leave(FitState& state, std::span<const std::filesystem::path> files) {
   state.left.clear();
   for (const std::filesystem::path& file : files) {
-    // What is there now and is not the command's own is in its way: the result will have another name.
+    // An existing file that is not the command's own is not replaced: the result will get another name.
     if (!Exists(file) || IsOwnFile(file)) state.left.push_back(AbsoluteName(file));
   }
 }
@@ -180,9 +180,9 @@ Result<FitState> ReadFitCheckpoint(const std::filesystem::path& path, const std:
   state.cloud.sh_degree = degree;
   state.optimizer = CloudOptimizer(state.cloud);
   state.optimizer.set_steps(state.step);
-  // Each array is as large as the file says only once the file has shown that it holds it.
+  // Arrays are allocated only after the file is shown to contain them.
   for (const auto& array : ArraysOf<FitState, Buffer<float>>(state, sh->shape[0], state.cloud.coefficients())) {
-    // What a strategy gathers is there as a whole or not at all, and who goes on knows which (Fitter::Begin).
+    // A strategy's sums are all present or all absent; Fitter::Begin knows which are needed.
     const bool optional = array.name == "mip_filter" ||
                           (array.name.starts_with("densification.") && file.Find("densification.count") == nullptr);
     if (optional && file.Find(array.name) == nullptr) continue;

@@ -42,14 +42,14 @@ InitialCloudOptions StartOptions(const FitOptions& options) {
   InitialCloudOptions start{.sh_degree = options.objective.render.sh_degree, .seed = options.seed};
   if (options.strategy == Strategy::kMcmc) {
     start.opacity = kMcmcInitialOpacity;
-    // The 3-D filter keeps integrals: it would make so small ones all but invisible, and they would fade to nothing.
+    // The 3-D filter keeps integrals, so it would make such small ones nearly invisible, and they would fade away.
     start.scale = options.mip_filter ? kMcmcInitialScaleOfFiltered : kMcmcInitialScale;
   }
   return start;
 }
 
 double UnitOf(double scene_scale) {
-  constexpr double kSceneScaleOfUnitCameras = 1.1;  // as TrainingViews defines the scene scale
+  constexpr double kSceneScaleOfUnitCameras = 1.1;  // see TrainingViews::scene_scale
   return scene_scale > 0 ? scene_scale / kSceneScaleOfUnitCameras : 1;
 }
 
@@ -119,7 +119,7 @@ std::string ToJsonText(const FitOptions& o) {
   const DensificationOptions& d = o.densification;
   const LearningRates& r = o.rates;
   const RenderOptions& render = o.objective.render;
-  // One level, so that what differs can be named by one word.
+  // Flat, so that a difference has a single name.
   nlohmann::json json = {
       {"steps", o.steps},
       {"seed", o.seed},

@@ -14,71 +14,70 @@
 
 namespace anchorsplat {
 
-// Who decides which Gaussians come and go.
+// The strategy that adds and removes Gaussians.
 enum class Strategy {
   kDefault,  // Densification, gsplat's DefaultStrategy
   kMcmc,     // McmcAfterStep, gsplat's MCMCStrategy
 };
 
-// Options that belong together: what gsplat's trainer calls its presets, and DefaultStrategy(absgrad=True) with the
-// threshold that it recommends for that.
+// Presets of gsplat's trainer, and DefaultStrategy(absgrad=True) with the threshold recommended for it.
 enum class FitPreset {
   kDefault,
   kAbsgrad,  // kDefault with DensificationOptions::absgrad
-  kMcmc,     // with regularizers and a start of its own (StartOptions)
+  kMcmc,     // also sets regularizers and the start (StartOptions)
 };
 
-// A standard 3DGS optimisation (Kerbl et al. 2023) with the numbers of gsplat's simple_trainer. FitOptionsFor gives
-// them for a number of steps; the fields hold what applies, already scaled.
+// A standard 3DGS optimisation (Kerbl et al. 2023) with the numbers of gsplat's simple_trainer. FitOptionsFor scales
+// them to a number of steps; the fields hold the scaled values.
 struct FitOptions {
   int64_t steps = kStandardSteps;
   uint64_t seed = 0;
-  int64_t sh_degree_interval = 1000;  // steps per degree: min(step / interval, 3) is in use
+  int64_t sh_degree_interval = 1000;  // steps per degree: uses min(step / interval, 3)
   LearningRates rates;
   Strategy strategy = Strategy::kDefault;
   DensificationOptions densification;  // of Strategy::kDefault
   McmcOptions mcmc;                    // of Strategy::kMcmc
   Regularizers regularizers;
-  // Mip-Splatting's 3-D smoothing filter (fit/mip_filter.h) is part of the Gaussians, and sizes follow the cameras
-  // every so many steps and whenever Gaussians come or move, until as many steps before the end. UseMipFilter sets it.
+  // Includes Mip-Splatting's 3-D smoothing filter (fit/mip_filter.h) in the Gaussians. Sizes are updated every
+  // `mip_filter_every` steps and when Gaussians are added or moved, except in the last such interval. Set by
+  // UseMipFilter.
   bool mip_filter = false;
   int64_t mip_filter_every = 100;
-  ObjectiveOptions objective;  // its `pixel` follows from the schedule, its `absgrad` from the densification
+  ObjectiveOptions objective;  // `pixel` is set by the schedule, `absgrad` by the densification
   PixelSchedule pixel;
-  // Views differ in brightness and tint: each has a gain and a bias per channel of its own (fit/exposure_per_view.h),
-  // which are taken out of its picture from this step on; −1: never.
+  // Step from which per-view gain and bias (fit/exposure_per_view.h) are removed from pictures; −1: never.
   int64_t exposure_from = -1;
-  FarUnits far = {};  // of a fit with a far shell (AddFarShell sets them)
+  FarUnits far = {};  // for a far shell, set by AddFarShell
 };
 
-// Where --exposure begins: before that, pictures and renders differ by more than their exposure.
+// Step at which --exposure begins: before, pictures and renders differ by more than exposure.
 inline int64_t ExposureFrom(int64_t steps) { return steps / 30; }
 
-inline constexpr int64_t kDefaultFitSteps = 15000;  // what the low-quality splats of the paper's data set had
+inline constexpr int64_t kDefaultFitSteps = 15000;  // as the low-quality splats of the paper's data set
 
 FitOptions FitOptionsFor(int64_t steps = kDefaultFitSteps, FitPreset preset = FitPreset::kDefault);
 
-// Switches the 3-D smoothing filter on, and the rendering that belongs to it (MipRendering).
+// Enables the 3-D smoothing filter and its rendering (MipRendering).
 void UseMipFilter(FitOptions& options);
 
-// How the points become Gaussians with which such a fit begins.
+// How points become the initial Gaussians of such a fit.
 InitialCloudOptions StartOptions(const FitOptions& options);
 
-// The unit in which MCMC's noise and the regulariser of scales are meant (McmcStep::unit), in world units: the largest
-// distance of a camera from the cameras' mean, or 1 where that is 0.
+// World units per unit of MCMC's noise and the scale regularizer (McmcStep::unit): the largest distance of a camera
+// from the cameras' mean, or 1 if that is 0.
 double UnitOf(double scene_scale);
 
-// Spherical harmonics in use at a step.
+// SH degree in use at a step.
 int ShDegreeAt(const FitOptions& options, int64_t step);
 
-// How the pixels of a step get their values.
+// Pixel model of a step.
 PixelModel PixelModelAt(const FitOptions& options, int64_t step);
 
-// kBadArgument for what cannot be run: steps below 1, rates that are negative, …, or the smoothing filter with areas of
-// pixels, which are filters of another kind.
+// kBadArgument for invalid options: steps below 1, negative rates, …, or the smoothing filter together with pixel
+// areas, which are a different filter.
 Status Validate(const FitOptions& options);
 
-// All options as one JSON object: two fits with equal text, equal views and an equal start are the same fit.
+// All options as one JSON object. Equal text, views and start mean an identical fit.
 std::string ToJsonText(const FitOptions& options);
 
 }  // namespace anchorsplat

@@ -11,18 +11,19 @@
 
 namespace anchorsplat {
 
-// All that changes during a fit.
+// Everything that changes during a fit.
 struct FitState {
   int64_t step = 0;  // steps done
   GaussianCloud cloud;
   CloudOptimizer optimizer;
-  Densification densification;  // of nothing where the strategy gathers nothing
-  Buffer<float> mip_filter;     // [N] world units, MipFilterSizes; empty where the fit has no such filter
-  // [V,6] of refinements that align their views: how far each has moved from where its camera says (MotionBetween in
-  // fit/view_pose.h). Empty: they stay.
+  Densification densification;  // empty if the strategy accumulates nothing
+  Buffer<float> mip_filter;     // [N] MipFilterSizes, world units; empty without that filter
+  // [V,6] for refinements that align views: each view's motion from its camera (MotionBetween in fit/view_pose.h).
+  // Empty:
+  // cameras are fixed.
   Buffer<float> motions;
-  Buffer<float> exposures;  // [V,6] of fits that take them out: gain and bias per channel, as they are measured
-  // Files that an interruption leaves besides its checkpoint, by their AbsoluteName: what goes on may replace them.
+  Buffer<float> exposures;  // [V,6] for fits that remove exposure: measured gain and bias per channel
+  // Files that an interruption leaves besides its checkpoint (AbsoluteName): resuming may replace them.
   std::vector<std::string> left;
 };
 

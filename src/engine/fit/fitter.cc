@@ -31,7 +31,7 @@ Result<Fitter> Fitter::Begin(const FitOptions& options, PictureCache pictures, d
     return Error{ErrorCode::kBadArgument, "fit: the state is that of a fit with other exposures of its views"};
   }
   Fitter fitter(options, std::move(pictures), scene_scale, std::move(state));
-  if (fitter.CanReside() && !fitter.done()) fitter.residence_.MoveIn(fitter.state_);
+  if (fitter.CanReside() && !fitter.done()) fitter.residence_.MoveToGpu(fitter.state_);
   return fitter;
 }
 
@@ -62,11 +62,14 @@ bool Fitter::CanReside() const {
          r.scale_reg == 0;
 }
 
-int64_t Fitter::size() const { return residence_.away() != nullptr ? residence_.away()->size() : state_.cloud.size(); }
+int64_t Fitter::size() const {
+  return residence_.resident() != nullptr ? residence_.resident()->size() : state_.cloud.size();
+}
 
 const FitState& Fitter::state() {
-  if (residence_.away() != nullptr) {
-    if (const Status copied = residence_.CopyHome(state_); !copied.ok()) residence_.MoveOut(state_, copied.error());
+  if (residence_.resident() != nullptr) {
+    if (const Status copied = residence_.CopyToHost(state_); !copied.ok())
+      residence_.MoveToHost(state_, copied.error());
   }
   return state_;
 }
@@ -77,7 +80,7 @@ Result<FitStep> Fitter::Step() {
   FitStep out;
   out.view = order_.At(step);
   const Camera& camera = pictures_.views()[static_cast<size_t>(out.view)];
-  ResidentFit* away = residence_.away();
+  ResidentFit* away = residence_.resident();
   if (away == nullptr || FollowsExposure()) {
     pictures_.LoadAhead(order_.From(step));
     ANCHORSPLAT_RETURN_IF_ERROR(pictures_.Load(out.view, picture_, ignored_));
@@ -86,7 +89,7 @@ Result<FitStep> Fitter::Step() {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const PackedPicture packed, pictures_.LoadPacked(out.view));
     const Status set = away->objective().SetTarget(packed, pictures_.background(), out.view);
     if (!set.ok()) {
-      residence_.MoveOut(state_, set.error());
+      residence_.MoveToHost(state_, set.error());
       return Step();
     }
   }
@@ -98,8 +101,8 @@ Result<FitStep> Fitter::Step() {
   objective.render.absgrad = options_.strategy == Strategy::kDefault && options_.densification.absgrad;
   const Camera rays = RaysOf(objective.pixel, camera);
   if (away != nullptr) {
-    if (const Status learned = LearnAway(objective, camera, out.view); !learned.ok()) {
-      residence_.MoveOut(state_, learned.error());
+    if (const Status learned = LearnOnGpu(objective, camera, out.view); !learned.ok()) {
+      residence_.MoveToHost(state_, learned.error());
       return Step();
     }
   } else {
@@ -108,10 +111,10 @@ Result<FitStep> Fitter::Step() {
 
   watch.Lap();
   if (away != nullptr) {
-    Result<DensificationChange> change = ChangeAway(rays);
+    Result<DensificationChange> change = ChangeOnGpu(rays);
     if (!change.ok()) {
-      // The state is behind the step, or much older.
-      if (!residence_.MoveOut(state_, change.error())) return Step();
+      // The state is one densification behind, or older if the GPU was lost.
+      if (!residence_.MoveToHost(state_, change.error())) return Step();
       change = ChangeGaussians(rays, nullptr);
     }
     out.change = std::move(change).value();
@@ -124,11 +127,11 @@ Result<FitStep> Fitter::Step() {
     return Error{ErrorCode::kBadArgument,
                  "fit: pruning removed every Gaussian; check that the pictures show more than background"};
   }
-  if (residence_.away() != nullptr && done()) {
+  if (residence_.resident() != nullptr && done()) {
     LastPsnr();
-    const Status home = residence_.MoveOut(state_);
-    if (!home.ok()) residence_.MoveOut(state_, home.error());
-  } else if (residence_.away() != nullptr && Residence::IsCopyDue(state_.step)) {
+    const Status home = residence_.MoveToHost(state_);
+    if (!home.ok()) residence_.MoveToHost(state_, home.error());
+  } else if (residence_.resident() != nullptr && Residence::IsCopyDue(state_.step)) {
     state();
   }
   return out;
@@ -156,21 +159,21 @@ Status Fitter::Learn(const ObjectiveOptions& objective, const Camera& camera, in
   return {};
 }
 
-Status Fitter::LearnAway(const ObjectiveOptions& objective, const Camera& camera, int64_t view) {
+Status Fitter::LearnOnGpu(const ObjectiveOptions& objective, const Camera& camera, int64_t view) {
   Stopwatch watch;
-  ResidentFit& fit = *residence_.away();
+  ResidentFit& fit = *residence_.resident();
   GpuObjective& shown = fit.objective();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const bool drawn, fit.Show(objective, camera));
   if (!drawn) return Error{ErrorCode::kBadArgument, Cat("a GPU's floats are too few digits for ", camera.name)};
   int64_t compared = view;
   if (FollowsExposure()) {
-    compared = -1;  // this step's picture is no other's
+    compared = -1;  // an adjusted picture must not be cached
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Image* rendered, shown.Rendered());
     FillIgnored(ignored_, *rendered, picture_);
     ANCHORSPLAT_RETURN_IF_ERROR(FollowExposure(*rendered, view, picture_, state_.exposures));
     ANCHORSPLAT_RETURN_IF_ERROR(shown.SetTarget(picture_, ignored_));
   }
-  away_times_.render += watch.Lap();
+  gpu_times_.render += watch.Lap();
   const Camera rays = RaysOf(objective.pixel, camera);
   ANCHORSPLAT_RETURN_IF_ERROR(
       fit.Learn(objective, compared,
@@ -183,28 +186,28 @@ Status Fitter::LearnAway(const ObjectiveOptions& objective, const Camera& camera
                  .width = rays.intrinsics.width,
                  .height = rays.intrinsics.height}));
   residence_.CountStep();
-  away_times_.backward += watch.Lap();
+  gpu_times_.backward += watch.Lap();
   return {};
 }
 
-Result<DensificationChange> Fitter::ChangeAway(const Camera& rays) {
+Result<DensificationChange> Fitter::ChangeOnGpu(const Camera& rays) {
   const int64_t step = state_.step;
   const DensificationOptions& how = options_.densification;
-  ResidentFit& fit = *residence_.away();
-  const auto at_home = [&]() -> Result<DensificationChange> {
-    ANCHORSPLAT_RETURN_IF_ERROR(residence_.MoveOut(state_));
+  ResidentFit& fit = *residence_.resident();
+  const auto on_host = [&]() -> Result<DensificationChange> {
+    ANCHORSPLAT_RETURN_IF_ERROR(residence_.MoveToHost(state_));
     DensificationChange change = ChangeGaussians(rays, nullptr);
     if (state_.cloud.empty()) return change;
-    ++state_.step;  // what the copy is of
-    residence_.MoveIn(state_);
+    ++state_.step;  // the copy is of this step
+    residence_.MoveToGpu(state_);
     --state_.step;
     return change;
   };
-  if (CutsToBudget(step)) return at_home();
+  if (CutsToBudget(step)) return on_host();
   DensificationChange change;
   if (Densification::Refines(how, step)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(RefinementPlan plan, fit.Plan(how, step, scene_scale_, options_.seed));
-    if (plan.change.rows.kept.empty() && plan.change.rows.fresh == 0) return at_home();
+    if (plan.change.rows.kept.empty() && plan.change.rows.fresh == 0) return on_host();
     ANCHORSPLAT_RETURN_IF_ERROR(fit.Apply(how, plan));
     change = std::move(plan.change);
   }
@@ -217,7 +220,7 @@ DensificationChange Fitter::ChangeGaussians(const Camera& rays, const CloudGradi
   const int64_t step = state_.step;
   DensificationChange change;
   if (options_.strategy == Strategy::kMcmc) {
-    // The trainer steps its schedule before its strategy: the rate is that of the next step.
+    // gsplat's trainer advances its schedule before the strategy, so this is the next step's rate.
     change = McmcAfterStep(options_.mcmc,
                            {.step = step,
                             .means_rate = MeansRate(options_.rates, scene_scale_, step + 1, options_.steps),
@@ -279,8 +282,8 @@ void Fitter::MeasureMipFilter() {
 FitTimes Fitter::times() const {
   FitTimes times = times_;
   times.objective = objective_.times();
-  times.objective.render += away_times_.render;
-  times.objective.backward += away_times_.backward;
+  times.objective.render += gpu_times_.render;
+  times.objective.backward += gpu_times_.backward;
   return times;
 }
 
@@ -290,8 +293,8 @@ double Fitter::LastLoss() {
 }
 
 double Fitter::LastPsnr() {
-  if (residence_.away() != nullptr) {
-    const auto loss = residence_.away()->objective().Loss();
+  if (residence_.resident() != nullptr) {
+    const auto loss = residence_.resident()->objective().Loss();
     if (!loss.ok()) return 0;
     last_loss_ = loss->loss.loss;
     last_psnr_ = -10 * std::log10(loss->mean_square);

@@ -20,73 +20,73 @@
 
 namespace anchorsplat {
 
-// Before an interruption writes its results: notes which of these files it will leave besides its checkpoint.
+// Notes which of these files an interruption will leave besides its checkpoint. Call before they are written.
 void Leave(FitState& state, std::span<const std::filesystem::path> files);
 
-// What one step saw.
+// Outcome of one step.
 struct FitStep {
   int64_t view = 0;
   DensificationChange change;
 };
 
-// Seconds on the clock, of all steps so far. A GPU works while the host goes on: what it takes counts where the host
-// waits for it, which is mostly in rendering.
+// Wall-clock seconds of all steps so far. GPU work overlaps with the host and counts where the host waits for it,
+// mostly in rendering.
 struct FitTimes {
   double load = 0;  // pictures from the cache
   ObjectiveTimes objective;
-  double adam = 0, densify = 0;  // the latter with the measuring of filters
+  double adam = 0, densify = 0;  // `densify` includes measuring filters
 };
 
-// The iterations of a fit, one at a time: view, objective, optimizer, densification. The state after k steps is the
-// same bits for any number of threads, and whether they were made in one go or from a checkpoint.
+// The optimisation loop of a fit, one step at a time: view, objective, optimizer, densification. The state after k
+// steps is the same bits for any number of threads, resumed or not.
 //
-// Where the run has a GPU (RunContext::device), the state stays there (fit/residence.h) unless the fit has what the GPU
-// has not: MCMC, a smoothing filter, regularizers, a far shell. Such a fit and one that does not fit draws its pictures
-// there. The state is then that of the CPU up to rounding, and the same bits at every run. A GPU that is lost costs at
-// most kCopyHomeEvery steps, which are made again.
+// With a GPU in the run (RunContext::device) the state lives there (fit/residence.h), unless the fit needs what the GPU
+// lacks: MCMC, a smoothing filter, regularizers, a far shell. Such a fit, or one that does not fit into its memory,
+// only renders there. The state then equals the CPU's up to rounding, with the same bits in every run. Losing the GPU
+// costs at most kCopyToHostEvery steps, which are repeated.
 class Fitter {
  public:
-  // `pictures` are the training views (at least one). Begins at `state.step`.
-  // Errors (kBadArgument): options that cannot be run, no views, no Gaussians, an invalid cloud, a state that lacks
-  // what the options need.
+  // `pictures`: the training views, at least one. Continues at `state.step`.
+  // Errors (kBadArgument): invalid options; no views; no Gaussians; an invalid cloud; a state without what the options
+  // need.
   static Result<Fitter> Begin(const FitOptions& options, PictureCache pictures, double scene_scale, FitState state);
-  // A state at step 0.
+  // The state at step 0.
   static FitState Fresh(GaussianCloud cloud);
 
-  // Errors: those of PictureCache and ViewObjective; kBadArgument when pruning has left no Gaussian.
+  // Runs one step. Errors: those of PictureCache and ViewObjective; kBadArgument when pruning left no Gaussian.
   Result<FitStep> Step();
 
   bool done() const { return state_.step >= options_.steps; }
   int64_t step() const { return state_.step; }  // steps done
   int64_t size() const;                         // Gaussians
-  // May have to come from the GPU. When that is lost, it is an older state, and step() is that of it.
+  // Copies from the GPU if needed. If that is lost, this is an older state and step() is its step.
   const FitState& state();
   void Leave(std::span<const std::filesystem::path> files) { anchorsplat::Leave(state_, files); }
   const FitOptions& options() const { return options_; }
   PictureCache& pictures() { return pictures_; }
   FitTimes times() const;
-  // Of the last step, before the step: its loss, NaN where there is none, and the peak signal-to-noise ratio of its
-  // picture, 0 where there is none.
+  // Of the last step, before its update: loss (NaN without one) and PSNR of its picture (0 without one).
   double LastLoss();
   double LastPsnr();
-  // A copy of the cloud as it is rendered, the smoothing filter fused, without rows that are not finite.
+  // A copy of the cloud as rendered: smoothing filter fused, non-finite rows removed.
   GaussianCloud UsableCloud();
 
  private:
   Fitter(const FitOptions& options, PictureCache pictures, double scene_scale, FitState state);
 
-  // Whether all of such a fit can be done on the GPU.
+  // Whether the whole fit can run on the GPU.
   bool CanReside() const;
-  // The step but for its densification: view `view`, loaded, with what options say for it.
+  // A step without densification, on the loaded view `view`.
   Status Learn(const ObjectiveOptions& objective, const Camera& camera, int64_t view);
-  Status LearnAway(const ObjectiveOptions& objective, const Camera& camera, int64_t view);
-  // Densification after the step, whose gradient is at hand unless it was gathered on the GPU.
+  Status LearnOnGpu(const ObjectiveOptions& objective, const Camera& camera, int64_t view);
+  // Densification after a step. `gradient`: of that step, or null if accumulated on the GPU.
   DensificationChange ChangeGaussians(const Camera& rays, const CloudGradient* gradient);
-  Result<DensificationChange> ChangeAway(const Camera& rays);
+  Result<DensificationChange> ChangeOnGpu(const Camera& rays);
   bool FollowsExposure() const { return options_.exposure_from >= 0 && state_.step >= options_.exposure_from; }
   bool CutsToBudget(int64_t step) const;
-  // Where growth ends, what is above the bound goes, least opacity × size first: the start had more, for growth never
-  // passes it. The steps that are left make up for it.
+  // At the end of growth, removes what exceeds the limit, least opacity × size first. Only a larger start can exceed
+  // it.
+  // The remaining steps compensate.
   void KeepToBudget(int64_t step, DensificationChange& change);
   void MeasureMipFilter();
 
@@ -99,39 +99,37 @@ class Fitter {
   MipFiltered filtered_;
   CloudGradient gradient_;
   Image picture_;
-  Buffer<uint8_t> ignored_;  // of it
+  Buffer<uint8_t> ignored_;  // of picture_
   double last_loss_, last_psnr_ = 0;
   Residence residence_;
-  ObjectiveTimes away_times_;
+  ObjectiveTimes gpu_times_;
   FitTimes times_;
 };
 
-// A state as a safetensors file: the cloud, Adam's moments, what densification gathered and the filter, exactly where
-// there are any; in the metadata
-// the step, `settings`, a JSON object of what the fit depends on, and a checksum. Whole or not at all; replaces an
-// older one.
+// Writes a state as a safetensors file: the cloud, Adam's moments, and, if present, densification's sums and the
+// filter, all exact. Metadata: the step, `settings` (JSON object of what the fit depends on) and a checksum. Written
+// whole or not at all; replaces an older file.
 Status WriteFitCheckpoint(const std::filesystem::path& path, const FitState& state, const std::string& settings);
 
-// Whether the file says that it is such a checkpoint, of this version or the one before it; false when it cannot be
-// read.
+// Whether the file declares itself such a checkpoint, of this version or an earlier one; false if unreadable.
 bool IsFitCheckpoint(const std::filesystem::path& path);
 
-// Takes away such a checkpoint if it is there. Nothing else is.
+// Deletes the file if it is such a checkpoint.
 void RemoveFitCheckpoint(const std::filesystem::path& path);
 
-// Those of the `left` files of such a checkpoint that are still as NoteFilesLeft found them: another file of the name,
-// or one that was written to since, is none of the run's business. Nothing when the checkpoint cannot be read.
+// The checkpoint's `left` files that are unchanged since NoteFilesLeft; replaced or modified ones are not the run's.
+// Empty if the checkpoint cannot be read.
 std::vector<std::string> FilesLeftWith(const std::filesystem::path& checkpoint);
 
-// Once they are written: puts down in the checkpoint which files the `left` ones are. Errors: it cannot be read or
-// written; then none of them counts as left.
+// Records in the checkpoint the versions of the `left` files, once written. Errors: reading or writing fails; then none
+// counts as left.
 Status NoteFilesLeft(const std::filesystem::path& checkpoint);
 
-// What a file is called for `left`: its absolute path, without "..", as printable text.
+// Name of a file in `left`: its absolute path without "..", as printable text.
 std::string AbsoluteName(const std::filesystem::path& file);
 
-// Errors: those of TensorFile; kBadFile when it is no such checkpoint, one of an earlier version or a damaged one;
-// kBadArgument when its settings are others than `settings`, naming the first that differs.
+// Reads a checkpoint. Errors: those of TensorFile; kBadFile: no such checkpoint, an earlier version, or damaged;
+// kBadArgument: settings differ from `settings` (names the first difference).
 Result<FitState> ReadFitCheckpoint(const std::filesystem::path& path, const std::string& settings);
 
 }  // namespace anchorsplat

@@ -9,7 +9,7 @@ namespace {
 
 const GpuKernel kAdamStep = {"adam_step", {wgsl::kAdamWgsl}};
 
-// `Adam` of adam.wgsl.
+// Struct `Adam` of adam.wgsl.
 struct AdamParameters {
   uint32_t rows, stride, columns, first_columns;
   float first_rate, rate, one_minus_beta1, beta2, one_minus_beta2, inverse_correction2, epsilon;

@@ -6,12 +6,12 @@
 
 namespace anchorsplat {
 
-// AdamParams (fit/adam.h) of rows that are on the GPU.
+// AdamParams (fit/adam.h) for rows on the GPU.
 struct GpuAdamParams {
   int64_t rows;               // N
   int64_t stride;             // numbers per row
-  int64_t columns;            // of each row that are updated, the first ones; ≤ stride
-  int64_t first_columns;      // of these that learn at `first_rate`, the others at `rate`
+  int64_t columns;            // updated columns per row, the first ones; ≤ stride
+  int64_t first_columns;      // of these, columns at `first_rate`; the others at `rate`
   double first_rate;          // ≥ 0
   double rate;                // ≥ 0
   double beta1, beta2;        // in [0, 1)
@@ -25,8 +25,7 @@ struct GpuAdamParams {
   const GpuBuffer* values;
 };
 
-// Records AdamStep (fit/adam.h): fit/adam.wgsl. The values are those of the CPU up to rounding, and the same bits at
-// every run.
+// Records AdamStep (fit/adam.h) as fit/adam.wgsl. Equals the CPU's up to rounding; the same bits in every run.
 void RecordAdamStep(const GpuAdamParams& p, GpuDevice& device);
 
 }  // namespace anchorsplat

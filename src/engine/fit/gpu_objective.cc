@@ -19,15 +19,15 @@ const GpuKernel kSpreadToRays = {"spread_to_rays", {wgsl::kPixelModelWgsl}};
 
 const GpuKernel kUnpackPicture = {"unpack_picture", {wgsl::kTargetsWgsl}};
 
-constexpr uint64_t kPartForTargets = 4;  // of the run's GPU memory goes to pictures that are kept
+constexpr uint64_t kPartForTargets = 4;  // a fourth of the run's GPU memory may hold cached targets
 
-// `Rays` of pixel_model.wgsl.
+// Struct `Rays` of pixel_model.wgsl.
 struct RaysParameters {
   std::array<uint32_t, 2> size;
   uint32_t samples, plane;
 };
 
-// `Bytes` of targets.wgsl.
+// Struct `Bytes` of targets.wgsl.
 struct UnpackParameters {
   std::array<float, 3> background;
   uint32_t plane, channels, masked;
@@ -92,7 +92,7 @@ Result<const Image*> GpuObjective::Rendered() {
   return &std::as_const(rendered_);
 }
 
-Result<GpuObjective::Target*> GpuObjective::RoomForTarget(uint64_t bytes, std::optional<int64_t> view) {
+Result<GpuObjective::Target*> GpuObjective::AllocateTarget(uint64_t bytes, std::optional<int64_t> view) {
   if (view && bytes <= left_) {
     Result<GpuMemory> made = device_->Allocate(bytes, "a picture to compare with");
     if (made.ok()) {
@@ -101,7 +101,7 @@ Result<GpuObjective::Target*> GpuObjective::RoomForTarget(uint64_t bytes, std::o
       target.memory = std::move(made).value();
       return &target;
     }
-    left_ = 0;  // what the rest needs comes first
+    left_ = 0;  // leaves memory for everything else
   }
   ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device_, passing_.memory, bytes, "a picture to compare with"));
   return &passing_;
@@ -112,7 +112,7 @@ Status GpuObjective::SetTarget(const PackedPicture& picture, const std::array<fl
   staged_bytes_.assign((size + 3) / 4 * 4, 0);
   std::copy(picture.pixels.begin(), picture.pixels.end(), staged_bytes_.begin());
   std::copy(picture.ignored.begin(), picture.ignored.end(), staged_bytes_.begin() + std::ssize(picture.pixels));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(Target * target, RoomForTarget(staged_bytes_.size(), view));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Target * target, AllocateTarget(staged_bytes_.size(), view));
   target->channels = picture.channels;
   target->masked = !picture.ignored.empty();
   target->background = background;
@@ -121,7 +121,7 @@ Status GpuObjective::SetTarget(const PackedPicture& picture, const std::array<fl
 }
 
 Status GpuObjective::SetTarget(const Image& picture, const Buffer<uint8_t>& ignored, std::optional<int64_t> view) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(Target * target, RoomForTarget(picture.pixels.size() * sizeof(float), view));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Target * target, AllocateTarget(picture.pixels.size() * sizeof(float), view));
   target->channels = 0;
   std::span<const float> values = picture.pixels;
   if (!ignored.empty()) {
@@ -155,7 +155,7 @@ Status GpuObjective::Compare(const ObjectiveOptions& options, GpuCloud& cloud, i
   const auto plane = static_cast<uint32_t>(width_ * height_);
   const auto rays = static_cast<uint32_t>(int64_t{plane} * samples_ * samples_);
   constexpr uint64_t kPixelBytes = 4 * sizeof(float);
-  // New memory is 0, and the gradient of alpha, of which the loss knows nothing, stays it.
+  // New memory is zero, and the gradient of alpha, which the loss never sets, stays zero.
   ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device_, gradient_, plane * kPixelBytes, "the gradient of a picture"));
   if (samples_ > 1) {
     ANCHORSPLAT_RETURN_IF_ERROR(EnsureGpuMemory(*device_, rays_gradient_, rays * kPixelBytes, "the gradient of rays"));

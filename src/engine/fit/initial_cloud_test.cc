@@ -112,11 +112,11 @@ TEST(Points, OfASplatAndThinned) {
   ASSERT_EQ(points.size(), 9);
   EXPECT_EQ(points.positions[3], cloud.means[6]);
   for (const float c : points.colors) EXPECT_TRUE(c >= 0 && c <= 1);
-  const InitialPoints three = Thinned(points, 3);
+  const InitialPoints three = SubsampleEvenly(points, 3);
   ASSERT_EQ(three.size(), 3);
   EXPECT_EQ(three.positions[3], points.positions[9]);
   EXPECT_EQ(three.colors[8], points.colors[20]);
-  EXPECT_EQ(Thinned(points, 100).positions, points.positions);
+  EXPECT_EQ(SubsampleEvenly(points, 100).positions, points.positions);
 }
 
 }  // namespace

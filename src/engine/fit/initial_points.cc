@@ -11,9 +11,9 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int64_t kProbes = 1 << 16;      // points that look for what the cameras see
-constexpr size_t kCamerasAsked = 64;      // of them, evenly chosen
-constexpr int64_t kTriesPerPoint = 1000;  // before a place that is hardly there is given up
+constexpr int64_t kProbes = 1 << 16;      // random points to find what cameras see
+constexpr size_t kCamerasAsked = 64;      // evenly chosen
+constexpr int64_t kTriesPerPoint = 1000;  // before giving up on a tiny region
 
 using Point = std::array<double, 3>;
 
@@ -43,7 +43,7 @@ int64_t CamerasThatSee(const Point& p, const std::vector<Camera>& cameras) {
   return count;
 }
 
-// Whether floats can hold it.
+// Appends a position if it fits in float.
 bool AppendPosition(const Point& world, const WorldOrigin& origin, InitialPoints& points) {
   const Point p = RelativeToOrigin(world, origin);
   if (!std::ranges::all_of(p, [](double x) { return std::isfinite(static_cast<float>(x)); })) return false;
@@ -101,7 +101,7 @@ InitialPoints RandomPointsInView(int64_t count, const std::vector<Camera>& camer
   }
   if (most == 0) return RandomPoints(count, scene_scale, seed);
 
-  // The box around what is seen well enough: drawing in it wastes less than drawing in the cube.
+  // Box around what is seen well enough: sampling in it wastes less than sampling the cube.
   Point low = cube_high, high = cube_low;
   for (size_t i = 0; i < probes.size(); ++i) {
     if (2 * seen[i] < most) continue;
@@ -131,7 +131,7 @@ InitialPoints PointsOf(const GaussianCloud& cloud, const WorldOrigin& origin) {
   return points;
 }
 
-InitialPoints Thinned(const InitialPoints& points, std::optional<int64_t> wanted) {
+InitialPoints SubsampleEvenly(const InitialPoints& points, std::optional<int64_t> wanted) {
   const int64_t n = points.size(), count = wanted.value_or(n);
   if (count >= n) return points;
   InitialPoints out;

@@ -12,36 +12,35 @@
 
 namespace anchorsplat {
 
-// Where a fit's first Gaussians stand.
+// Positions and colours of a fit's initial Gaussians.
 struct InitialPoints {
-  Buffer<float> positions;  // [M,3] world, from an origin on (core/world_origin.h)
+  Buffer<float> positions;  // [M,3] world, relative to an origin (core/world_origin.h)
   Buffer<float> colors;     // [M,3] rgb 0–1
 
   int64_t size() const { return static_cast<int64_t>(positions.size() / 3); }
 };
 
-// Points of structure from motion, seen from `origin`. Positions beyond the range of floats are left out.
+// Points of structure from motion, relative to `origin`. Drops positions beyond the range of float.
 InitialPoints PointsOf(std::span<const ColmapPoint> points, const WorldOrigin& origin = {});
-// The same of world positions with rgb 0–1, [M,3] each.
+// The same for world positions with rgb 0–1, [M,3] each.
 InitialPoints PointsOf(std::span<const double> positions, std::span<const float> colors, const WorldOrigin& origin);
 
-// `count` points of random colours, uniform within ±`extent` scene scales of the origin: gsplat's `init_type =
-// "random"`, which has 100,000 of them and an `init_extent` of 3. INRIA's trainer has ±1.3 units for NeRF-synthetic
-// scenes, which is 0.3 scene scales.
+// `count` points of random colour, uniform within ±`extent` scene scales of the origin, as gsplat's `init_type =
+// "random"` (100,000 points, `init_extent` 3). INRIA's trainer uses ±1.3 units for NeRF-synthetic scenes: 0.3 scene
+// scales.
 inline constexpr int64_t kRandomPoints = 100000;
 inline constexpr double kRandomExtent = 3;
 InitialPoints RandomPoints(int64_t count, double scene_scale, uint64_t seed, double extent = kRandomExtent);
 
-// `count` points of random colours, uniform in the part of such a cube, around the cameras' mean centre, that many
-// cameras see: at least half as many as see the best-seen place. For views without points around something this is a
-// better start than the whole cube, most of which nobody looks at. Falls back to RandomPoints where no camera sees any
-// of it.
+// `count` points of random colour in the part of such a cube, around the cameras' mean centre, that many cameras see:
+// at least half as many as see the best-seen place. A better start than the whole cube, most of which no camera sees.
+// Falls back to RandomPoints if no camera sees any of it.
 InitialPoints RandomPointsInView(int64_t count, const std::vector<Camera>& cameras, double scene_scale, uint64_t seed);
 
-// Centres, seen from `origin`, and constant colours of a splat, to begin another fit from; of rows that are finite.
+// Centres and DC colours of a splat's finite rows, relative to `origin`, as a start for another fit.
 InitialPoints PointsOf(const GaussianCloud& cloud, const WorldOrigin& origin = {});
 
-// `count` of the points, evenly spread over their order; all of them when there are not as many, or nobody says.
-InitialPoints Thinned(const InitialPoints& points, std::optional<int64_t> count);
+// `count` points evenly chosen by index; all if there are fewer or `count` is unset.
+InitialPoints SubsampleEvenly(const InitialPoints& points, std::optional<int64_t> count);
 
 }  // namespace anchorsplat

@@ -19,14 +19,14 @@ namespace {
 
 constexpr double kGrowth = 1.05;                         // per refinement
 constexpr double kGateSteepness = 100, kGateAt = 0.995;  // k and x0 of gsplat's op_sigmoid
-constexpr double kClosedGate = 1e-12;                    // moves no mean by as much as a float of it can show
-constexpr int64_t kNoiseRows = 4096;                     // that draw from one stream
+constexpr double kClosedGate = 1e-12;                    // below this, noise does not change a float mean
+constexpr int64_t kNoiseRows = 4096;                     // rows per random stream
 
 double OpacityOf(const GaussianCloud& cloud, int64_t row) {
   return Sigmoid(double{cloud.opacity_logits[static_cast<size_t>(row)]});
 }
 
-// Rows drawn in proportion to their opacity, each as often as it comes.
+// Draws rows in proportion to opacity, with repetition.
 std::vector<int64_t> DrawByOpacity(const GaussianCloud& cloud, const std::vector<int64_t>& rows, int64_t count,
                                    Random& random) {
   std::vector<double> up_to(rows.size());
@@ -42,7 +42,7 @@ std::vector<int64_t> DrawByOpacity(const GaussianCloud& cloud, const std::vector
   return drawn;
 }
 
-// Every row that was drawn shares its look with those that come to it.
+// Replaces each drawn row by Gaussians that share its look with those relocated to it.
 void Share(const std::vector<int64_t>& drawn, double min_opacity, GaussianCloud& cloud) {
   std::vector<int64_t> sorted = drawn;
   std::sort(sorted.begin(), sorted.end());
@@ -81,7 +81,7 @@ void Relocate(const McmcOptions& options, Random& random, GaussianCloud& cloud, 
   for (int64_t i = 0; i < cloud.size(); ++i) (IsDead(cloud, i, options.min_opacity) ? dead : alive).push_back(i);
   if (dead.empty()) return;
   const std::vector<int64_t> drawn = DrawByOpacity(cloud, alive, std::ssize(dead), random);
-  if (drawn.empty()) return;  // nobody is left to move to
+  if (drawn.empty()) return;  // there is no live Gaussian to relocate to
   Share(drawn, options.min_opacity, cloud);
   for (size_t k = 0; k < dead.size(); ++k) CopyRow(drawn[k], dead[k], cloud);
   change.relocated = std::ssize(dead);
@@ -93,7 +93,7 @@ void Relocate(const McmcOptions& options, Random& random, GaussianCloud& cloud, 
 
 void Grow(const McmcOptions& options, Random& random, GaussianCloud& cloud, DensificationChange& change) {
   const int64_t before = cloud.size();
-  // One at least: 5 % of fewer than 20 are none.
+  // At least one: 5 % of fewer than 20 is none.
   const auto grown = std::max(before + 1, static_cast<int64_t>(kGrowth * static_cast<double>(before)));
   const int64_t target = std::min(options.cap_max, grown);
   if (target <= before) return;
@@ -118,7 +118,7 @@ void Grow(const McmcOptions& options, Random& random, GaussianCloud& cloud, Dens
   for (size_t k = 0; k < drawn.size(); ++k) CopyRow(drawn[k], before + static_cast<int64_t>(k), cloud);
 }
 
-// means += Σ·η·gate(o)·scaler with η normal: along its own shape, and only where a Gaussian hardly shows.
+// means += Σ·η·gate(o)·scaler with η normal: along the Gaussian's shape, and only if it is nearly transparent.
 void AddNoise(double scaler, const McmcStep& step, GaussianCloud& cloud) {
   ParallelFor(0, cloud.size(), kNoiseRows, [&](int64_t begin, int64_t end) {
     Random random = RandomStream(step.seed, RandomPurpose::kNoise, (step.step << 16) + begin / kNoiseRows);
@@ -158,15 +158,15 @@ Relocation RelocationOf(double opacity, int64_t ratio, double min_opacity) {
   const auto n = static_cast<double>(std::clamp<int64_t>(ratio, 1, kMostRelocated));
   const double most = 1 - double{std::numeric_limits<float>::epsilon()};
   const double shared = std::clamp(-std::expm1(std::log1p(-std::min(opacity, 1.0)) / n), min_opacity, most);
-  // The trapezoidal rule: its error falls faster than any power of the distance where all derivatives vanish at the
-  // ends. Beyond 6, N·e^(−x²) is below 1e-14.
+  // Trapezoidal rule: its error falls faster than any power of the step if all derivatives vanish at the ends. Beyond
+  // 6, N·e^(−x²) is below 1e-14.
   constexpr double kDistance = 1.0 / 16;
   constexpr int kPoints = 96;
   double sum = 0;
   for (int j = 0; j <= kPoints; ++j) {
     const double x = kDistance * j;
     const double covered = -std::expm1(n * std::log1p(-shared * std::exp(-x * x)));
-    sum += j == 0 ? covered : 2 * covered;  // it is even
+    sum += j == 0 ? covered : 2 * covered;  // the integrand is even
   }
   return {shared, opacity / (kDistance * sum * std::numbers::inv_sqrtpi)};
 }

@@ -12,7 +12,7 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr double kFilterMargin = 0.15;  // of the picture's sides
+constexpr double kFilterMargin = 0.15;  // relative to the picture's sides
 constexpr int64_t kFilterRows = 4096;
 
 }  // namespace
@@ -71,7 +71,7 @@ void MipFilterBackward(const GaussianCloud& cloud, std::span<const float> sizes,
       // With k the kept part and o' = k·o:  ∂logit o'/∂logit o = (1 − o)/(1 − o'),  ∂logit o'/∂ln k = 1/(1 − o'),
       // ∂ln k/∂ln s = 1 − s²/s'²,  ∂ln s'/∂ln s = s²/s'².
       const double left = smoothing.Transmittance(logit);
-      if (!(left > 0)) continue;  // infinitely opaque, and so large that the filter takes nothing: it stays what it is
+      if (!(left > 0)) continue;  // fully opaque, and so large that the filter changes nothing
       const double g_logit = gradient.opacity_logits[i];
       gradient.opacity_logits[i] = static_cast<float>(g_logit * Sigmoid(-logit) / left);
       for (size_t a = 0; a < 3; ++a) {
@@ -90,9 +90,8 @@ void FuseMipFilter(std::span<const float> sizes, GaussianCloud& cloud) {
 void CapFilteredOpacities(std::span<const float> sizes, double opacity, GaussianCloud& cloud) {
   for (size_t i = 0; i < cloud.opacity_logits.size(); ++i) {
     double kept = 1;
-    if (sizes[i] > 0)
-      kept = std::exp(SmoothingOf(cloud.log_scales.data() + 3 * i, double{sizes[i]}).log_opacity_factor);
-    if (!(opacity < kept)) continue;  // o' < k can be no more than that
+    if (sizes[i] > 0) kept = std::exp(SmoothingOf(cloud.log_scales.data() + 3 * i, double{sizes[i]}).log_opacity_factor);
+    if (!(opacity < kept)) continue;  // o' < k cannot exceed it
     float& logit = cloud.opacity_logits[i];
     logit = std::min(logit, static_cast<float>(std::log(opacity / (kept - opacity))));
   }

@@ -6,9 +6,9 @@
 
 namespace anchorsplat {
 
-// Mean squared distance of every point to its three nearest others [N], exact, by a k-d tree: structure-from-motion
-// leaves lone points far away, where a grid would walk through empty cells. With fewer than three others, over those
-// there are; 0 for a point alone. Positions [N,3] must be finite.
+// Mean squared distance [N] of every point to its three nearest others (to all, if fewer; 0 for a single point). Exact,
+// by a k-d tree: structure from motion leaves lone points far away, for which a grid would search many empty cells.
+// `positions` [N,3] must be finite.
 Buffer<float> MeanSquaredNeighbourDistance(std::span<const float> positions);
 
 }  // namespace anchorsplat

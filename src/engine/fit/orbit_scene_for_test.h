@@ -12,7 +12,7 @@
 #include "images/image_io.h"
 #include "render/rasterizer.h"
 
-// For tests: a project on disk with pictures of a known splat.
+// A project on disk with pictures of a known splat.
 namespace anchorsplat::orbit_scene {
 
 // Coloured Gaussians in a ball of radius 0.5.

@@ -77,11 +77,11 @@ void PictureCache::LoadAhead(std::span<const int64_t> views) {
     const Pinhole& size = views_[static_cast<size_t>(view)].intrinsics;
     const int64_t own = int64_t{size.width} * size.height;
     pixels += own;
-    room -= 5 * own;  // bytes at most: colour, alpha and what is ignored
+    room -= 5 * own;  // upper bound in bytes: colour, alpha and mask
     if (room < 0 || pixels > kDecodedAtOnce) break;
     chosen.push_back(view);
   }
-  if (chosen.size() < 2) return;  // Load does as well
+  if (chosen.size() < 2) return;  // Load is as good
   std::vector<Stored> read(chosen.size());
   ParallelFor(0, static_cast<int64_t>(chosen.size()), 1, [&](int64_t k, int64_t) {
     auto fresh = Read(chosen[static_cast<size_t>(k)]);

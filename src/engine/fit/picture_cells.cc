@@ -13,9 +13,9 @@ namespace anchorsplat {
 namespace {
 
 constexpr int kMostCells = 16, kFewestCells = 4;  // along the longer side
-constexpr double kPointsPerCell = 4;              // empty by chance: 2 %
-constexpr float kSameColor = 6.0f / 255;          // noise, compression, a little dirt
-constexpr double kFlatWithin = 0.05;              // of a cell's pixels may be brighter, and as many darker
+constexpr double kPointsPerCell = 4;              // then 2 % of cells are empty by chance
+constexpr float kSameColor = 6.0f / 255;          // tolerates noise, compression, a little dirt
+constexpr double kFlatWithin = 0.05;  // fraction of a cell's pixels that may be brighter, and as many darker
 
 bool IsSameColor(const std::array<float, 3>& a, const std::array<float, 3>& b) {
   for (size_t c = 0; c < 3; ++c) {
@@ -60,7 +60,7 @@ PixelBox PictureCells::BoxOf(size_t cell) const {
           row + 1 == rows_ ? height_ : static_cast<int>((row + 1) * side_)};
 }
 
-Status LookAtPicture(const Camera& camera, const std::array<float, 3>& background, LookedAtPicture& picture) {
+Status ReadCellPicture(const Camera& camera, const std::array<float, 3>& background, CellPicture& picture) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(ViewPicture read, ReadPhotograph(camera));
   const Pinhole& size = camera.intrinsics;
   if (read.image.width != size.width || read.image.height != size.height) {
@@ -110,27 +110,27 @@ Status LookAtPicture(const Camera& camera, const std::array<float, 3>& backgroun
   return {};
 }
 
-void ClosePlainCells(const std::array<float, 3>& background, std::span<LookedAtPicture> pictures) {
+void ClosePlainCells(const std::array<float, 3>& background, std::span<CellPicture> pictures) {
   std::array<float, 3> most{};
   for (size_t c = 0; c < 3; ++c) {
     std::vector<float> values;
-    for (const LookedAtPicture& picture : pictures) {
+    for (const CellPicture& picture : pictures) {
       for (const auto& color : picture.open_colors) values.push_back(color[c]);
     }
     if (values.empty()) return;
     most[c] = Quantile(values, 0.5);
   }
-  for (LookedAtPicture& picture : pictures) {
+  for (CellPicture& picture : pictures) {
     for (const auto& [cell, color] : picture.flat) {
       if (IsSameColor(color, background) || IsSameColor(color, most)) picture.cells.Close(cell);
     }
   }
 }
 
-double ShareOfOpenCells(std::span<const LookedAtPicture> pictures) {
-  // Each picture counts the same, however fine its cells are.
+double ShareOfOpenCells(std::span<const CellPicture> pictures) {
+  // Pictures count equally, however fine their cells.
   double sum = 0;
-  for (const LookedAtPicture& picture : pictures) {
+  for (const CellPicture& picture : pictures) {
     int64_t open = 0;
     for (size_t cell = 0; cell < picture.cells.size(); ++cell) open += picture.cells.IsOpen(cell) ? 1 : 0;
     if (open > 0) sum += static_cast<double>(open) / static_cast<double>(picture.cells.size());
@@ -138,7 +138,7 @@ double ShareOfOpenCells(std::span<const LookedAtPicture> pictures) {
   return pictures.empty() ? 0 : sum / static_cast<double>(pictures.size());
 }
 
-bool MeanColor(const LookedAtPicture& picture, int x, int y, int half, std::array<float, 3>& color) {
+bool MeanColor(const CellPicture& picture, int x, int y, int half, std::array<float, 3>& color) {
   const Image& image = picture.image;
   std::array<double, 3> sum{};
   int64_t count = 0;

@@ -12,13 +12,13 @@
 
 namespace anchorsplat {
 
-// A picture in coarse square cells, some of which are open: nothing known stands there (fit/far_shell.h).
+// A picture in coarse square cells. Open cells have no known geometry (fit/far_shell.h).
 class PictureCells {
  public:
   PictureCells() = default;
 
-  // Open are those in which none of the points [M,3] lies. Cells are a 16th of the picture's longer side, or larger, up
-  // to a quarter, so that the points in the picture are four to a cell on average.
+  // Cells without any of the points [M,3] are open. Cell side: 1/16 of the picture's longer side, or larger, up to 1/4,
+  // so that the picture has four points per cell on average.
   PictureCells(const Camera& camera, std::span<const float> positions);
 
   int columns() const { return columns_; }
@@ -27,7 +27,7 @@ class PictureCells {
   bool IsOpenAt(double x, double y) const { return IsOpen(CellAt(x, y)); }
   void Close(size_t cell) { open_[cell] = 0; }
   size_t size() const { return open_.size(); }
-  // Its pixels, within the picture.
+  // Pixels of a cell, within the picture.
   PixelBox BoxOf(size_t cell) const;
 
  private:
@@ -38,12 +38,12 @@ class PictureCells {
   std::vector<uint8_t> open_;
 };
 
-// One of a set of pictures that are looked at one after the other.
-struct LookedAtPicture {
+// A picture of a set that is examined one by one.
+struct CellPicture {
   PictureCells cells;
-  Image image;             // [3 or 4,H,W]; empty once it is forgotten
-  Buffer<uint8_t> hidden;  // [H,W] 1 where there is nothing to see: masked or transparent; empty: nowhere
-  // Of open cells that have one colour up to a few grey levels: which, and that colour.
+  Image image;             // [3 or 4,H,W]; empty after Forget
+  Buffer<uint8_t> hidden;  // [H,W] 1 = masked or transparent; empty: none
+  // An open cell of uniform colour (up to a few grey levels).
   struct FlatCell {
     size_t cell;
     std::array<float, 3> color;
@@ -54,18 +54,18 @@ struct LookedAtPicture {
   void Forget() { image = {}, hidden = {}; }
 };
 
-// Reads the camera's picture, closes those of its cells in which more than half of the pixels are hidden, and notes
-// what is flat. Transparent pixels are laid over the background. Errors: those of ReadPhotograph; kBadFile when the
-// picture has not its camera's size.
-Status LookAtPicture(const Camera& camera, const std::array<float, 3>& background, LookedAtPicture& picture);
+// Reads the camera's picture, closes cells with more than half of their pixels hidden, and records flat cells.
+// Composites alpha over the background. Errors: those of ReadPhotograph; kBadFile if the picture's size is not its
+// camera's.
+Status ReadCellPicture(const Camera& camera, const std::array<float, 3>& background, CellPicture& picture);
 
-// Closes flat cells whose colour is the background's or that of the middle one of all open cells.
-void ClosePlainCells(const std::array<float, 3>& background, std::span<LookedAtPicture> pictures);
+// Closes flat cells whose colour is the background's or the median of all open cells.
+void ClosePlainCells(const std::array<float, 3>& background, std::span<CellPicture> pictures);
 
-// Of all cells; 0 where there are none.
-double ShareOfOpenCells(std::span<const LookedAtPicture> pictures);
+// Relative to all cells; 0 without cells.
+double ShareOfOpenCells(std::span<const CellPicture> pictures);
 
-// Mean colour of the pixels around (x, y), up to `half` away in x and y, that are not hidden; false: there is none.
-bool MeanColor(const LookedAtPicture& picture, int x, int y, int half, std::array<float, 3>& color);
+// Mean colour of visible pixels within `half` of (x, y) in x and y; false if there are none.
+bool MeanColor(const CellPicture& picture, int x, int y, int half, std::array<float, 3>& color);
 
 }  // namespace anchorsplat

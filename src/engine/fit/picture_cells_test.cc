@@ -69,7 +69,7 @@ TEST(PictureCells, CloseWhereAPointIs) {
 }
 
 TEST(PictureCells, ColoursLeaveOutWhatIsHidden) {
-  LookedAtPicture picture;
+  CellPicture picture;
   picture.image = Image(4, 4, 3);
   std::iota(picture.image.pixels.begin(), picture.image.pixels.end(), 0.0f);
   std::array<float, 3> color{};
@@ -88,17 +88,17 @@ TEST(PictureCells, ColoursLeaveOutWhatIsHidden) {
 }
 
 TEST(PictureCells, SharesCountPicturesAlike) {
-  LookedAtPicture fine, coarse;
+  CellPicture fine, coarse;
   fine.cells = PictureCells(CameraOf(160, 160), {});
   coarse.cells = PictureCells(CameraOf(2, 2), {});
   for (size_t i = 0; i < fine.cells.size(); ++i) fine.cells.Close(i);
-  const LookedAtPicture both[] = {fine, coarse};
+  const CellPicture both[] = {fine, coarse};
   EXPECT_DOUBLE_EQ(ShareOfOpenCells(both), 0.5);
   EXPECT_EQ(ShareOfOpenCells({}), 0);
 }
 
 TEST(PictureCells, PlainOnesCloseByBackgroundOrByMost) {
-  LookedAtPicture picture;
+  CellPicture picture;
   picture.cells = PictureCells(CameraOf(40, 40), {});
   const std::array<float, 3> white = {1, 1, 1}, black = {0, 0, 0}, red = {1, 0, 0};
   picture.open_colors = {white, white, white, black, red};

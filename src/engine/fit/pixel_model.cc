@@ -18,7 +18,7 @@ void Shape(int width, int height, int channels, Image& image) {
   image = Image(width, height, channels);
 }
 
-// Sums of `samples` neighbours of a row. Four is what almost everybody uses and worth unrolling.
+// Sums `samples` neighbours in a row. Unrolled for four, the usual number.
 void SumAcross(const float* in, int samples, float scale, float* out, int count) {
   if (samples == 4) {
     for (int x = 0; x < count; ++x) {
@@ -67,12 +67,12 @@ PixelModel PixelModelAt(const PixelSchedule& schedule, double done) {
 RenderOptions RaysOf(const PixelModel& model, const RenderOptions& options) {
   if (model.IsPoint()) return options;
   RenderOptions rays = options;
-  // Pixels of the closer view per ray, along a side.
+  // Closer-view pixels per ray side.
   const double share = std::min(1.0, model.samples / model.upscale);
   const double closer = DilationOf(options) * share * share, box = (1 - share * share) / 12;
   rays.dilation = static_cast<float>(closer + box);
   if (box <= 0) return rays;
-  // Where opacity is compensated, a splat keeps the integral that it has without any dilation, at every size.
+  // With compensated opacity a splat keeps its undilated integral at every size.
   if (!IsCompensated(options.mode)) {
     rays.compensated_from = static_cast<float>(closer);
     rays.mode = RenderMode::kAntialiased;

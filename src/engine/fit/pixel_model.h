@@ -11,18 +11,18 @@
 
 namespace anchorsplat {
 
-// How a camera's pixel gets its value from a splat. Rasterizers sample: a pixel is what the ray through its centre
-// meets, of Gaussians widened by d = 0.3 px² of that very pixel (DilationOf the render mode). Cameras average over the
-// pixel's area. A splat that will be seen `upscale` times closer has to look right when its pictures at that resolution
-// are averaged down to the pixels of its training views: that is the area model, upscale² rays for each pixel.
+// How a pixel gets its value from a splat. Rasterizers sample: a pixel is the value of the ray through its centre, with
+// Gaussians dilated by d = 0.3 px² of that pixel (DilationOf the render mode). Cameras average over the pixel's area. A
+// splat to be seen `upscale` times closer should match its training pictures when rendered at that resolution and
+// averaged down: the area model, with upscale² rays per pixel.
 //
-// Fewer rays, `samples`² of them, stand for that with wider Gaussians: each ray's share of the pixel holds upscale/
-// samples of the closer view's pixels per side, which as a box has the variance (1 − (samples/upscale)²)/12 of its
-// side. It is added to the dilation d·(samples/upscale)² that the closer view's pixels have at this size, and opacity
-// is lowered so that every Gaussian keeps its integral. For one Gaussian that is right up to the shape of the box; for
-// Gaussians that hide each other it is an approximation, much cheaper, and exact where samples = upscale.
+// Fewer rays, `samples`² of them, approximate it with wider Gaussians. Each ray then covers upscale/samples closer
+// pixels per side, a box of variance (1 − (samples/upscale)²)/12 of its side². This is added to d·(samples/upscale)²,
+// the closer pixels' dilation at this size, and opacity is lowered to keep each Gaussian's integral. For a single
+// Gaussian this is right up to the box's shape. With occlusion it is an approximation, but much cheaper. It is exact
+// for samples = upscale.
 struct PixelModel {
-  int samples = 1;     // rays per pixel and side; 1 to upscale, rounded up
+  int samples = 1;     // rays per pixel side; 1 to upscale, rounded up
   double upscale = 1;  // ≥ 1; 1 with one sample is the point model of 3DGS
 
   bool IsPoint() const { return samples == 1 && upscale == 1; }
@@ -31,35 +31,35 @@ struct PixelModel {
 
 inline constexpr int kMostSamples = 16;
 
-// kBadArgument: an upscale below 1 or above kMostSamples, samples below 1 or above the upscale, rounded up.
+// kBadArgument: upscale not in 1 … kMostSamples, samples not in 1 … upscale, rounded up.
 Status Validate(const PixelModel& model);
 
-// The model that renders all rays: samples = upscale, rounded up.
+// The model with all rays: samples = upscale, rounded up.
 PixelModel AreaModel(double upscale);
 
-// From few rays to all of them while an optimisation runs: one, then half as many per side as there will be, then all.
-// Early on the cheap model is good enough, and the last part undoes its bias.
+// Schedule of the rays: one per pixel, then half as many per side as in the end, then all. The cheap model suffices
+// early, and the last part removes its bias.
 struct PixelSchedule {
-  double upscale = 1;      // 1: the point model from beginning to end
-  double half_from = 0.6;  // part of the run, 0 to 1, from which on half of the rays per side are rendered …
+  double upscale = 1;      // 1: the point model throughout
+  double half_from = 0.6;  // fraction of the run after which half the rays per side are used …
   double all_from = 0.85;  // … and all of them
 };
 
 Status Validate(const PixelSchedule& schedule);  // kBadArgument
 
-// The model when the part `done` of the run, 0 to 1, is over.
+// The model after the fraction `done` of the run, 0–1.
 PixelModel PixelModelAt(const PixelSchedule& schedule, double done);
 
-// What a rasterizer has to do for the model: the options with another dilation and mode, and the camera with a pixel
-// for every ray.
+// Rasterizer inputs for a model: options with its dilation and mode, and a camera with one pixel per ray.
 RenderOptions RaysOf(const PixelModel& model, const RenderOptions& options);
 Camera RaysOf(const PixelModel& model, const Camera& camera);
 
-// `averages` becomes the mean of each block of samples × samples values of `rays`, whose sides are multiples of it.
+// Averages blocks of samples × samples values of `rays`, whose sides are multiples of it, into `averages`.
 void AverageRays(const Image& rays, int samples, Image& averages);
 
-// The transpose of it: every ray of a block gets 1/samples² of `averages`. Only `box` is read, and what belongs to it
-// is written; the rest of `rays` stays as it is. Returns the box of rays.
+// Transpose of AverageRays: each ray of a block gets 1/samples² of `averages`. Reads only `box` and writes only its
+// rays.
+// Returns the box of rays.
 PixelBox SpreadToRays(const Image& averages, const PixelBox& box, int samples, Image& rays);
 
 }  // namespace anchorsplat

@@ -6,8 +6,8 @@
 
 namespace anchorsplat {
 
-// What a fit draws random numbers for. Each purpose and index (a step, an epoch) has a stream of its own that follows
-// from the seed alone: a fit that goes on from a checkpoint needs no generator's state to draw the same numbers.
+// Purposes of random numbers. Each purpose and index (a step, an epoch) has its own stream, derived from the seed
+// alone: a resumed fit draws the same numbers without storing a generator's state.
 enum class RandomPurpose : uint64_t {
   kInitialQuats = 1,
   kInitialPoints = 2,

@@ -8,7 +8,7 @@
 
 namespace anchorsplat {
 
-void Residence::MoveIn(const FitState& state) {
+void Residence::MoveToGpu(const FitState& state) {
   fit_.reset();
   Result<std::shared_ptr<GpuDevice>> device = GpuOfRun();
   if (!device.ok()) GiveUpGpu(device.error());
@@ -24,7 +24,7 @@ void Residence::MoveIn(const FitState& state) {
   exposures_ = state.exposures;
 }
 
-Status Residence::CopyHome(FitState& state) {
+Status Residence::CopyToHost(FitState& state) {
   ANCHORSPLAT_RETURN_IF_ERROR(fit_->Read(state.cloud, state.optimizer, state.densification));
   state.optimizer.set_steps(learned_);
   step_ = state.step;
@@ -32,14 +32,14 @@ Status Residence::CopyHome(FitState& state) {
   return {};
 }
 
-Status Residence::MoveOut(FitState& state) {
-  ANCHORSPLAT_RETURN_IF_ERROR(CopyHome(state));
+Status Residence::MoveToHost(FitState& state) {
+  ANCHORSPLAT_RETURN_IF_ERROR(CopyToHost(state));
   fit_.reset();
   return {};
 }
 
-bool Residence::MoveOut(FitState& state, const Error& why) {
-  const Status home = MoveOut(state);
+bool Residence::MoveToHost(FitState& state, const Error& why) {
+  const Status home = MoveToHost(state);
   if (home.ok()) {
     LogWarning(Cat("The Gaussians go back to main memory, and the work goes on there: ", why.message));
     return true;

@@ -22,13 +22,13 @@ const GpuKernel kCapOpacities = {"cap_opacities", {wgsl::kRowsWgsl}};
 constexpr uint64_t kGatheredBytes = 4 * sizeof(float);
 constexpr size_t kNewcomerNumbers = 8;
 
-// `Rows` of rows.wgsl.
+// Struct `Rows` of rows.wgsl.
 struct RowsParameters {
   uint32_t count, width, first, limit, from_first, from_count;
   std::array<float, 2> numbers;
 };
 
-// A column of a block, and of host memory.
+// A column of a block in GPU and host memory.
 struct Column {
   GpuMemory GpuCloudBlock::*memory;
   Buffer<float> GaussianCloud::*values;
@@ -59,7 +59,7 @@ Result<GaussianCloud> ReadCloud(GpuDevice& device, const GpuCloud& cloud) {
   return out;
 }
 
-// Moments lie as the cloud's columns do.
+// Moments in the layout of a cloud's columns.
 CloudView ViewOf(std::span<const CloudOptimizer::Moments> moments, Buffer<float> CloudOptimizer::Moments::*order,
                  int sh_degree) {
   CloudView view;
@@ -249,7 +249,7 @@ Status ResidentFit::Apply(const DensificationOptions& options, const RefinementP
     to[6] = shape.opacity_logit;
     from.push_back(static_cast<uint32_t>(newcomer.source));
   }
-  // All the room there has to be comes first, so that nothing is left half done.
+  // Allocates everything first, so that a failure leaves nothing half done.
   GpuCloud cloud, first, second;
   GpuMemory gathered, source, newcomers;
   const int degree = cloud_.sh_degree();
@@ -264,7 +264,7 @@ Status ResidentFit::Apply(const DensificationOptions& options, const RefinementP
 
   device_->Write(*source, 0, std::as_bytes(std::span(from)));
   TakeRows(*source, count, cloud_, cloud);
-  TakeRows(*source, kept, first_, first);  // newcomers begin at 0, as new memory does
+  TakeRows(*source, kept, first_, first);  // newcomers' moments are zero, like all new memory
   TakeRows(*source, kept, second_, second);
   if (!shapes.empty()) {
     device_->Write(*newcomers, 0, std::as_bytes(std::span(shapes)));

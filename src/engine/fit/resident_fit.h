@@ -15,25 +15,25 @@
 
 namespace anchorsplat {
 
-// A step of Adam on a cloud on the GPU, as CloudOptimizer::Step makes it, and what densification gathers on the way.
+// An Adam step on a cloud on the GPU, as CloudOptimizer::Step, and what densification accumulates with it.
 struct ResidentStep {
   LearningRates rates;
   double means_rate = 0;
-  int sh_degree = 0;             // coefficients above stay
-  int64_t number = 1;            // of the step: 1 for the first
-  int64_t learning = INT64_MAX;  // Gaussians, the first ones; the others stay
-  bool gathers = false;
-  bool absgrad = false;       // of DensificationOptions
-  int width = 0, height = 0;  // pixels of the picture whose gradient it is
+  int sh_degree = 0;             // coefficients of higher degrees stay
+  int64_t number = 1;            // of the step, from 1
+  int64_t learning = INT64_MAX;  // number of leading Gaussians to update; the others stay
+  bool gathers = false;          // accumulates for densification
+  bool absgrad = false;          // of DensificationOptions
+  int width = 0, height = 0;     // of the gradient's picture, pixels
 };
 
-// What changes during a fit, on the GPU: the cloud, Adam's moments and what densification gathers. Pictures are the
-// objective's. Everything is recorded and done in order; only what says so waits for it.
-//
-// The values are those of the CPU up to rounding, and the same bits at every run.
+// The state of a fit on the GPU: cloud, Adam's moments and densification's sums. Target pictures belong to the
+// objective.
+// Work is recorded and runs in order; only methods that say so wait for it. Equals the CPU's up to rounding, with the
+// same bits in every run.
 class ResidentFit {
  public:
-  // Uploads them. Errors: no room for them, of GpuDevice::Allocate.
+  // Uploads a state. Errors: not enough memory; those of GpuDevice::Allocate.
   static Result<std::unique_ptr<ResidentFit>> Begin(const std::shared_ptr<GpuDevice>& device,
                                                     const GaussianCloud& cloud, const CloudOptimizer& optimizer,
                                                     const Densification& densification);
@@ -45,21 +45,20 @@ class ResidentFit {
   Result<bool> Show(const ObjectiveOptions& options, const Camera& camera) {
     return objective_.Show(options, cloud_, origin_, camera);
   }
-  // GpuObjective::Compare, and the step along its gradient. Errors: of the former, before anything has changed unless
-  // the device has failed.
+  // GpuObjective::Compare and an Adam step. Errors: those of the former, with nothing changed unless the device failed.
   Status Learn(const ObjectiveOptions& options, int64_t view, const ResidentStep& step);
 
-  // Densification::Plan: what it looks at is read. Errors: of GpuDevice::Read.
+  // Densification::Plan, from data read back. Errors: those of GpuDevice::Read.
   Result<RefinementPlan> Plan(const DensificationOptions& options, int64_t step, double scene_scale, uint64_t seed);
-  // What the plan says: rows go and come in the cloud and in the moments, and nothing is gathered yet of any.
-  // Errors: no room, before anything has changed.
+  // Executes a plan on the cloud and the moments and clears densification's sums. Errors: not enough memory; then
+  // nothing has changed.
   Status Apply(const DensificationOptions& options, const RefinementPlan& plan);
-  // CapOpacities, and their moments are forgotten.
+  // CapOpacities; also zeroes their moments.
   void ResetOpacities(double cap);
 
-  // All of it, to where it came from. Errors: those of GpuDevice::Read; then nothing has changed.
+  // Reads everything back. Errors: those of GpuDevice::Read; then nothing has changed.
   Status Read(GaussianCloud& cloud, CloudOptimizer& optimizer, Densification& densification) const;
-  // Some Gaussians, in this order. Errors: as Read.
+  // Reads some Gaussians, in this order. Errors: as Read.
   Result<GaussianCloud> ReadRows(std::span<const int64_t> rows) const { return cloud_.ReadRows(*device_, rows); }
 
  private:
@@ -72,10 +71,10 @@ class ResidentFit {
   std::shared_ptr<GpuDevice> device_;
   GpuObjective objective_;
   GpuCloud cloud_;
-  WorldOrigin origin_ = {0, 0, 0};  // of it
+  WorldOrigin origin_ = {0, 0, 0};  // of cloud_
   GpuCloud first_, second_;         // moments, in the same columns
-  GpuMemory gathered_;              // vec4f [N]: grad2d, count, radii; none where nothing is gathered
-  // Of the last Plan, which Apply goes on with.
+  GpuMemory gathered_;              // vec4f [N]: grad2d, count, radii; empty if nothing is accumulated
+  // From the last Plan, for Apply.
   GaussianCloud shapes_;  // without coefficients
 };
 

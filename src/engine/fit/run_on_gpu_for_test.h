@@ -10,7 +10,7 @@
 
 namespace anchorsplat {
 
-// A run whose GPU is the given one.
+// Runs on the given GPU during its lifetime.
 class RunOnGpu {
  public:
   explicit RunOnGpu(std::shared_ptr<GpuDevice> device, const std::atomic<bool>* stop = nullptr)

@@ -12,7 +12,7 @@
 
 namespace anchorsplat {
 
-// A tiny project of pictures with `side` pixels a side, and a short schedule in which everything happens.
+// A tiny project with pictures of `side` pixels, and a short schedule that exercises every event.
 class SmallFits : public testing::Test {
  protected:
   explicit SmallFits(int side) : side_(side) {}

@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Whether a folder is a project by itself, not only a folder of them.
+// Whether a folder is itself a project, rather than a folder of projects.
 bool HasCameras(const fs::path& folder) {
   for (const char* name : {"transforms.json", "transforms_train.json", "cameras.json", "poses_bounds.npy"}) {
     if (Exists(folder / name)) return true;
@@ -30,7 +30,7 @@ bool HasCameras(const fs::path& folder) {
   return !FindColmapModels(folder).empty();
 }
 
-// The smallest of the folders in it that are named by a number and are projects; `folder` itself if there is none.
+// The smallest project in folders named by a number; `folder` itself if there is none.
 fs::path SmallestResolution(const fs::path& folder) {
   fs::path found = folder;
   int smallest = 0;
@@ -47,8 +47,8 @@ fs::path SmallestResolution(const fs::path& folder) {
   return found;
 }
 
-// What `views` and data sets write beside the folder of a resolution, which is a COLMAP project and cannot say it:
-// chair/transforms_128.json of chair/128.
+// The background stated beside a resolution's COLMAP folder, which cannot state it: chair/transforms_128.json for
+// chair/128, as `views` and data sets write it.
 Result<std::optional<std::array<float, 3>>> BackgroundBeside(const fs::path& resolution) {
   fs::path folder = resolution.lexically_normal();
   if (!folder.has_filename()) folder = folder.parent_path();
@@ -58,7 +58,7 @@ Result<std::optional<std::array<float, 3>>> BackgroundBeside(const fs::path& res
   return set.background;
 }
 
-// The cameras with pictures of a file or folder, by name; the names of the others are added to `without`.
+// The cameras of a file or folder that have pictures, by name. Appends the names of the others to `without`.
 Result<std::vector<Camera>> WithPictures(CameraSet set, const fs::path& source, const fs::path& missing, int downscale,
                                          std::vector<std::string>& without) {
   std::vector<Camera> views;
@@ -85,7 +85,7 @@ Result<std::vector<Camera>> WithPictures(CameraSet set, const fs::path& source, 
   return views;
 }
 
-// NeRF-synthetic's division into training and test views is what its author wants a fit to use.
+// Mentions other camera files: NeRF-synthetic's split into training and test views takes precedence.
 void TellOfOtherCameras(const fs::path& folder, const fs::path& used) {
   std::string others;
   for (const char* name : {"transforms.json", "cameras.json"}) {
@@ -98,14 +98,14 @@ void TellOfOtherCameras(const fs::path& folder, const fs::path& used) {
   LogWarning(Cat("using ", used.string(), "; to use other cameras of this project, pass one of: ", others));
 }
 
-// The sparse model that ReadCameras takes for a project, if it takes one; else nothing.
+// The sparse model that ReadCameras uses for a project; empty if none.
 fs::path ModelFolder(const fs::path& project) {
   if (!IsFolder(project)) return project.parent_path();
   const std::vector<FoundModel> models = FindColmapModels(project);
   return models.empty() ? fs::path() : models[0].folder;
 }
 
-// From the world of a file to the one of the cameras, and to where that begins.
+// Transformation from a file's world to the cameras', and the origin.
 struct PointFrame {
   std::optional<Similarity> moved;
   WorldOrigin origin;
@@ -115,7 +115,7 @@ struct PointFrame {
   }
 };
 
-// A PLY of points; of an empty path there are none.
+// Reads a PLY of points; an empty path means none.
 Status ReadPoints(const fs::path& path, const PointFrame& frame, InitialPoints& points) {
   if (path.empty()) return {};
   ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
@@ -125,7 +125,7 @@ Status ReadPoints(const fs::path& path, const PointFrame& frame, InitialPoints& 
   return {};
 }
 
-// Those of a sparse model as COLMAP writes it, else as 3DGS leaves them beside it. There may be none.
+// Reads the points of a sparse model: COLMAP's own files, else the PLY that 3DGS leaves beside them. There may be none.
 Status ReadPointsOfModel(const fs::path& model, const PointFrame& frame, InitialPoints& points) {
   auto read = ReadColmapPoints(model);
   if (read.ok()) {
@@ -138,7 +138,7 @@ Status ReadPointsOfModel(const fs::path& model, const PointFrame& frame, Initial
   return Exists(ply) ? ReadPoints(ply, frame, points) : Status();
 }
 
-// The views as seen from the origin, and how large the scene is.
+// Makes views relative to the origin, and computes the scene scale.
 void MoveToOrigin(const fs::path& source, const ProjectOptions& options, std::vector<Camera>& views,
                   TrainingViews& out) {
   out.origin = options.origin ? *options.origin : ChooseOrigin(views);
@@ -243,7 +243,7 @@ Result<InitialPoints> InitialPointsOf(FitInit init, const TrainingViews& views, 
   if (init == FitInit::kPoints && !has_points) {
     return Error{ErrorCode::kBadArgument, "the project has no points to start from; use random ones"};
   }
-  if (init == FitInit::kPoints || (init == FitInit::kAuto && has_points)) return Thinned(views.points, count);
+  if (init == FitInit::kPoints || (init == FitInit::kAuto && has_points)) return SubsampleEvenly(views.points, count);
   const int64_t random = count.value_or(kRandomPoints);
   if (init == FitInit::kRandom) return RandomPoints(random, views.scene_scale, seed, extent);
   return RandomPointsInView(random, views.train, views.scene_scale, seed);

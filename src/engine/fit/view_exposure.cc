@@ -13,10 +13,10 @@ namespace anchorsplat {
 namespace {
 
 constexpr int64_t kExposureGrain = 1 << 14;  // pixels per task
-constexpr double kRidge = 1e-4;              // per pixel: outweighed by a contrast of 1 %
+constexpr double kRidge = 1e-4;              // per pixel; a contrast of 1 % outweighs it
 constexpr double kSigmaOfMedian = 1.4826;
 constexpr float kSigmas = 6;
-constexpr float kVisible = 0.5f / 255;  // differences below say nothing about noise: both show plain background
+constexpr float kVisible = 0.5f / 255;  // smaller differences are plain background, not noise
 
 Status CheckSizes(const Image& a, const Image& b) {
   if (a.width == b.width && a.height == b.height && a.channels == 3 && b.channels == 3) return {};
@@ -76,7 +76,7 @@ void RemoveExposure(const ViewExposure& exposure, Image& target) {
 Result<int64_t> IgnoreOutliers(const Image& rendered, float least, Image& target) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckSizes(rendered, target));
   const int64_t plane = rendered.plane();
-  std::vector<float> worst(static_cast<size_t>(plane));  // of the channels
+  std::vector<float> worst(static_cast<size_t>(plane));  // maximum over channels
   for (int64_t i = 0; i < plane; ++i) {
     float difference = 0;
     for (int c = 0; c < 3; ++c)

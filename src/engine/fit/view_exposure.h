@@ -7,23 +7,22 @@
 
 namespace anchorsplat {
 
-// How bright a photograph came out: target ≈ gain·rendered + bias for each colour channel.
+// Exposure of a photograph: target ≈ gain·rendered + bias per colour channel.
 struct ViewExposure {
   std::array<double, 3> gain = {1, 1, 1};
   std::array<double, 3> bias = {0, 0, 0};
 };
 
-// Least squares over all pixels, drawn a little towards gain 1 and bias 0 so that a picture without contrast says
-// nothing. Gains stay within [½, 2]. Images of one size and three channels (kBadArgument).
+// Least-squares estimate over all pixels, slightly regularised towards gain 1 and bias 0 so that a picture without
+// contrast has no effect. Gains stay within [½, 2]. Errors (kBadArgument): images not of one size and three channels.
 Result<ViewExposure> EstimateExposure(const Image& rendered, const Image& target);
 
-// `target` becomes what it would be at gain 1 and bias 0.
+// Converts `target` to gain 1 and bias 0.
 void RemoveExposure(const ViewExposure& exposure, Image& target);
 
-// Where the two differ by more than anything that is in the scene at this size can explain, `target` becomes
-// `rendered`, so that nothing is learned there: somebody who walked by, a lens flare. The bound is six standard
-// deviations of the differences, estimated from their median over pixels that differ at all, and at least `least`.
-// Returns how many pixels that were. Images of one size and three channels (kBadArgument).
+// Replaces outliers in `target` by `rendered`, so that nothing is learned there: passers-by, lens flares. An outlier
+// differs by more than six standard deviations, estimated from the median difference over pixels that differ at all,
+// and by at least `least`. Returns their number. Errors (kBadArgument): images not of one size and three channels.
 Result<int64_t> IgnoreOutliers(const Image& rendered, float least, Image& target);
 
 }  // namespace anchorsplat

@@ -6,13 +6,12 @@
 
 namespace anchorsplat {
 
-// Which of `views` (≥ 1) a step uses: every epoch goes through all of them once, in an order of its own that follows
-// from seed and epoch.
+// Order in which steps use the `views` (≥ 1): every epoch visits each once, in an order that depends on seed and epoch.
 class ViewOrder {
  public:
   ViewOrder(int64_t views, uint64_t seed);
   int64_t At(int64_t step);  // 0 … views − 1; step ≥ 0
-  // That of `step` and those of the steps after it in the same epoch. Until the next call.
+  // The view of `step` and the following ones of its epoch. Valid until the next call.
   std::span<const int64_t> From(int64_t step);
 
  private:

@@ -13,16 +13,16 @@ namespace anchorsplat {
 namespace {
 
 constexpr int kPoseRowsPerTask = 16;
-constexpr float kSolid = 0.1f;  // alpha from which on there is something whose depth is known
-// Per pixel that counts, of the mean squared gradient: what is told by less than this share of it stays.
+constexpr float kSolid = 0.1f;  // alpha from which depth is meaningful
+// Regularisation relative to the mean squared gradient per pixel: motions with less evidence stay.
 constexpr double kPoseRidge = 1e-3;
 constexpr double kMostStep = 1;       // pixels a step
-constexpr double kHuber = 4.0 / 255;  // differences above count linearly
+constexpr double kHuber = 4.0 / 255;  // larger differences count linearly
 constexpr size_t kMotions = 6;
 
 using Motion = std::array<double, kMotions>;
 
-// The normal equations of a part of the picture.
+// Partial normal equations.
 struct Normal {
   std::array<double, kMotions * kMotions> matrix{};
   Motion right{};
@@ -54,7 +54,7 @@ Rotation RotationBy(const std::array<double, 3>& w) {
   return r;
 }
 
-// Of a small rotation.
+// Rotation vector of a small rotation.
 std::array<double, 3> VectorOf(const Rotation& r) {
   const std::array<double, 3> axis = {(r[7] - r[5]) / 2, (r[2] - r[6]) / 2, (r[3] - r[1]) / 2};  // sin(angle)·unit
   const double sine = std::hypot(axis[0], axis[1], axis[2]);
@@ -63,7 +63,7 @@ std::array<double, 3> VectorOf(const Rotation& r) {
   return {axis[0] * scale, axis[1] * scale, axis[2] * scale};
 }
 
-// Of `a` x = `b` by Cholesky; `a` symmetric and positive definite. False when it is not.
+// Solves `a` x = `b` by Cholesky for symmetric positive definite `a`; false otherwise.
 bool Solve(std::array<double, kMotions * kMotions> a, Motion b, Motion& x) {
   constexpr size_t n = kMotions;
   for (size_t j = 0; j < n; ++j) {
@@ -87,7 +87,7 @@ bool Solve(std::array<double, kMotions * kMotions> a, Motion b, Motion& x) {
   return std::all_of(x.begin(), x.end(), [](double v) { return std::isfinite(v); });
 }
 
-// Mean depth of what is solid; 0 where nothing is.
+// Mean depth of solid pixels; 0 without any.
 double MeanDepth(const RenderOutput& output) {
   double sum = 0;
   int64_t count = 0;
@@ -99,7 +99,7 @@ double MeanDepth(const RenderOutput& output) {
   return count > 0 ? sum / static_cast<double>(count) : 0;
 }
 
-// Adds what rows [first, last) say. `unit` are the lengths of a motion of one pixel.
+// Accumulates rows [first, last). `unit`: each motion that moves the centre by a pixel.
 void AddRows(const RenderOutput& output, const Image& picture, const Pinhole& k, const Motion& unit, int first,
              int last, Normal& normal) {
   const Image& shown = output.color;
@@ -110,19 +110,19 @@ void AddRows(const RenderOutput& output, const Image& picture, const Pinhole& k,
       const double z = output.depth.pixels[static_cast<size_t>(at)];
       if (!(z > 0)) continue;
       const double x = (u + 0.5 - k.cx) / k.fx, y = (v + 0.5 - k.cy) / k.fy;
-      // What is seen here moves by these for a rotation about, and a shift along, each axis.
+      // Flow of this pixel for a rotation about, and a translation along, each axis.
       const Motion across = {-k.fx * x * y, k.fx * (1 + x * x), -k.fx * y, k.fx / z, 0, -k.fx * x / z};
       const Motion down = {-k.fy * (1 + y * y), k.fy * x * y, k.fy * x, 0, k.fy / z, -k.fy * y / z};
       for (int c = 0; c < 3; ++c) {
         const float* s = shown.channel(c) + at;
         const float* p = picture.channel(c) + at;
-        // The mean of both pictures' gradients makes a step good to the second order (Benhimane and Malis 2004).
+        // Averaging both pictures' gradients makes the step second-order accurate (Benhimane and Malis 2004).
         const double gx = 0.25 * (double{s[1]} - double{s[-1]} + double{p[1]} - double{p[-1]});
         const double gy = 0.25 * (double{s[shown.width]} - double{s[-shown.width]} + double{p[shown.width]} -
                                   double{p[-shown.width]});
         const double off = double{s[0]} - double{p[0]};
         const double weight = std::abs(off) <= kHuber ? 1 : kHuber / std::abs(off);
-        Motion row;  // how the difference changes with every motion: what moves right shows what was left of here
+        Motion row;  // derivative of the difference: what moves right shows what was to its left
         for (size_t i = 0; i < kMotions; ++i) row[i] = -(gx * across[i] + gy * down[i]) * unit[i];
         for (size_t i = 0; i < kMotions; ++i) {
           normal.right[i] -= weight * row[i] * off;
@@ -202,7 +202,7 @@ Result<Camera> PoseAligner::Align(const GaussianCloud& cloud, const RenderOption
       ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewExposure found, EstimateExposure(output_.color, compared_));
       RemoveExposure(found, compared_);
     }
-    // A pixel at the middle; about the axis of view, a pixel at half a picture from it; along it, the same.
+    // A pixel at the centre; about or along the viewing axis, a pixel at half a picture from it.
     const double half = 0.25 * (k.width + k.height);
     const Motion unit = {1 / k.fy, 1 / k.fx, 1 / half, depth / k.fx, depth / k.fy, depth / half};
     Normal normal = NormalEquations(output_, compared_, k, unit);

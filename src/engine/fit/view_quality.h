@@ -10,15 +10,15 @@
 
 namespace anchorsplat {
 
-// How alike renders and pictures are, as means over views; renders clamped to 0–1, not quantised.
+// Similarity of renders and pictures, means over views; renders are clamped to 0–1, not quantised.
 struct ViewQuality {
-  int64_t views = 0;  // that were measured
+  int64_t views = 0;  // views measured
   double psnr = 0;    // dB; 0 without views
   double ssim = 0;    // of metrics/image_metrics.h
 };
 
-// Over all views of `pictures`, which are seen from the cloud's origin as TrainingViews are, pixels as `pixel` says;
-// ignored ones do not count. Views of which a mask leaves nothing are left out and named in a warning. Errors: those of
+// Measures all views of `pictures`, which are relative to the cloud's origin as TrainingViews are. `pixel`: the pixel
+// model. Ignored pixels do not count; fully masked views are skipped and named in a warning. Errors: those of
 // Rasterizer and PictureCache; kInterrupted.
 Result<ViewQuality> MeasureQuality(const GaussianCloud& cloud, const RenderOptions& options, PictureCache& pictures,
                                    const PixelModel& pixel = {});

@@ -9,13 +9,14 @@
 
 namespace anchorsplat {
 
-// What a file of weights may hold.
+// The network in a weights file, of either kind.
 using AnyNetwork = std::variant<PublishedNetwork, CompactNetwork>;
 
-// True when the file is a tensor file and its metadata that of a compact network. Reads the directory only.
+// Whether the file is a tensor file whose metadata names a compact network. Reads only the tensor directory.
 Result<bool> HoldsCompactNetwork(const std::filesystem::path& path);
 
-// Opens either kind, told apart by content. `precision` is for PublishedNetwork; compact networks are fp32.
+// Loads a network; the file's content decides which kind. `precision` applies to PublishedNetwork; compact networks
+// run in fp32.
 // Errors: those of TensorFile::Open, LoadCompactNetwork and LoadPublishedNetwork.
 Result<AnyNetwork> LoadAnyNetwork(const std::filesystem::path& path,
                                   WeightPrecision precision = WeightPrecision::kFloat);

@@ -28,14 +28,14 @@ namespace anchorsplat {
 
 namespace {
 
-// Standard fits show at least this share of their Gaussians (Reading::showing), most others less.
-constexpr double kStandardShowing = 0.6;
-// Shares worth a word.
+// Standard fits show at least this share of their Gaussians (Reading::visible_share); most other splats show less.
+constexpr double kStandardVisibleShare = 0.6;
+// Shares from which the log mentions Gaussians unlike training, and warns.
 constexpr double kNotable = 0.01, kMost = 0.5;
 
-// Whether it is certainly of that kind; what cannot be read is for loading to tell.
+// Whether it is certainly a compact network; unreadable files are reported on loading.
 bool IsCompact(const ModelSettings& model) {
-  if (model.file.empty()) return true;  // the one that is part of the program
+  if (model.file.empty()) return true;  // built into the program
   const auto compact = HoldsCompactNetwork(model.file);
   return compact.ok() && *compact;
 }
@@ -45,7 +45,7 @@ bool IsPublished(const ModelSettings& model) {
   return compact.ok() && !*compact;
 }
 
-// What a network looks at. The compact ones work on top of the filter, the published ones have arithmetic of their own.
+// Options that apply to each kind of network. Compact ones build on the filter; the published one does not.
 std::vector<MethodOption> NetworkOptions() {
   std::vector<MethodOption> options = WidthOptions([](const MethodUse& use) {
     return IsPublished(use.options.model) ? "with a compact network, --method filter or refine" : "";
@@ -84,7 +84,7 @@ std::vector<MethodOption> NetworkOptions() {
 
 Result<GaussianCloud> EnhanceWithPublished(EnhanceInput input, const PublishedNetwork& network,
                                            const PublishedOptions& options, StepReport& report) {
-  LeaveRegion(input);
+  KeepOnlyRegion(input);
   ANCHORSPLAT_ASSIGN_OR_RETURN(PublishedResult result, EnhanceWithPublishedNetwork(input.cloud, network, options));
   const PublishedReport& r = result.report;
   report.dropped += r.not_finite + r.outside;
@@ -96,8 +96,7 @@ Result<GaussianCloud> EnhanceWithPublished(EnhanceInput input, const PublishedNe
   return std::move(result.cloud);
 }
 
-// bfloat16 is there for speed alone. Where a processor has no products of it, it is the slower of the two, and the less
-// exact one.
+// bfloat16 only serves speed: without dot products for it, a processor is slower and less exact with it.
 WeightPrecision FastPrecision(WeightPrecision asked) {
   if (asked != WeightPrecision::kBFloat16 || UsesBFloat16Dot()) return asked;
   LogWarning("using fp32: bf16 would be slower, as this processor has no bfloat16 products");
@@ -110,14 +109,14 @@ Result<AnyNetwork> Load(const ModelSettings& model, Shipped shipped) {
   return AnyNetwork(std::move(network));
 }
 
-// The network that was used last, for all calls that ask for it, runs side by side among them; one that is in use
-// stays with whoever uses it. A file that has changed under its name is another one.
+// Caches the last network for all calls that ask for it, concurrent ones included. A network in use stays alive. A
+// changed file counts as another network.
 class LastNetwork {
  public:
-  // `shipped`: where no file is named.
+  // `shipped`: used if no file is named.
   Result<std::shared_ptr<const AnyNetwork>> Get(const ModelSettings& model, Shipped shipped = Shipped::kStandard) {
     const std::lock_guard lock(mutex_);
-    // Before it is read: what changes meanwhile is read again at the next call.
+    // Taken before reading, so that a change meanwhile is noticed by the next call.
     const std::optional<FileVersion> version = VersionOf(model.file);
     if (network_ == nullptr || file_ != model.file || shipped_ != shipped || version_ != version ||
         precision_ != model.precision) {
@@ -142,13 +141,13 @@ class LastNetwork {
 
 Shipped ShippedFor(const EnhanceInput& input, const ModelSettings& model) {
   if (IsCompensated(input.cloud.render_mode)) return Shipped::kAntialiased;
-  // Better than merging four into one, by 0.6 dB on fifteen fits (docs/results/copies.md).
+  // 0.6 dB better than merging four copies into one, over fifteen fits (docs/results/copies.md).
   if (model.copies == 1) return Shipped::kSingle;
-  return input.showing >= kStandardShowing ? Shipped::kStandard : Shipped::kClassic;
+  return input.visible_share >= kStandardVisibleShare ? Shipped::kStandard : Shipped::kClassic;
 }
 
-// What they are worth is in docs/results/copies.md: much for dense splats, nothing for standard fits but where a budget
-// leaves few copies of each.
+// Benefit (docs/results/copies.md): large for dense splats; none for standard fits unless a budget leaves few copies of
+// each.
 bool WantsStandIns(Shipped shipped, const EnhanceInput& input, const ModelSettings& model) {
   const bool pays = shipped == Shipped::kClassic || (shipped == Shipped::kStandard && model.options.max_gaussians > 0);
   return model.file.empty() && pays && !model.copies && !input.is_refined;
@@ -159,18 +158,18 @@ bool WantsStandIns(Shipped shipped, const EnhanceInput& input, const ModelSettin
 Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upscale, const CompactNetwork& network,
                                                 const ModelSettings& model, StepReport& report,
                                                 const RefineControl& control, const CompactNetwork* stand_in) {
-  // Of what stays one Gaussian for one.
+  // How many copies of each Gaussian stay.
   const CopyChoice choice = {model.copies, model.merge_cost.value_or(input.is_refined ? kMergeCostOfStart : kMergeCost),
                              model.options.max_gaussians, model.options.prune_opacity};
   const auto within_budget = [&]() -> Result<GaussianCloud> {
     ANCHORSPLAT_RETURN_IF_ERROR(Validate(CopyChoice{.max_gaussians = choice.max_gaussians}, 1));
-    LeaveRegion(input);
+    KeepOnlyRegion(input);
     report.facts = {{"copies", int64_t{1}}};
-    const int64_t left_out = LeaveOutLeastVisible(model.options.max_gaussians, input.cloud);
+    const int64_t left_out = DropLeastVisible(model.options.max_gaussians, input.cloud);
     if (left_out > 0) report.facts.emplace_back("left_out", left_out);
     return std::move(input.cloud);
   };
-  // There is no lost width to give back, and residuals are on top of the filter.
+  // The splat has no lost width to restore.
   if (input.filter_strength <= ShownStrength(upscale, input.cloud.render_mode)) return within_budget();
   if (IsCompensated(input.cloud.render_mode) && !network.config().knows_kind) {
     LogInfo(Cat("filtering only: the network was trained on classic splats, and this is ",
@@ -180,9 +179,9 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
     if (!grown.ok()) return grown.error();
     return within_budget();
   }
-  const int64_t count = input.inside.empty() ? input.cloud.size() : std::ranges::count(input.inside, 1);
+  const int64_t count = input.in_region.empty() ? input.cloud.size() : std::ranges::count(input.in_region, 1);
   const auto n = static_cast<double>(count);
-  // Dust is not worth copies. Whoever asks for a number gets it.
+  // Specks get no copies, unless a number of copies was requested.
   std::vector<int64_t> dust;
   const Stopwatch watch;
   if (!model.copies) {
@@ -196,11 +195,12 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
                                                                       .choice = choice,
                                                                       .single = dust,
                                                                       .stand_in = stand_in,
-                                                                      .inside = input.inside,
+                                                                      .in_region = input.in_region,
                                                                       .checkpoint = control.checkpoint,
                                                                       .resume = control.resume}));
-  const auto outside = static_cast<double>(result.outside), partly = static_cast<double>(result.partly);
-  if (outside + partly > kNotable * n) {
+  const auto unlike = static_cast<double>(result.unlike_training),
+             partly_unlike = static_cast<double>(result.partly_unlike_training);
+  if (unlike + partly_unlike > kNotable * n) {
     const auto [least, greatest] = network.TrainedUpscales();
     const bool other_upscale = least <= greatest && (upscale < 0.99 * least || upscale > 1.01 * greatest);
     const std::string text = Cat(
@@ -211,7 +211,7 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
                       : "");
     outside + partly > kMost* n ? LogWarning(text) : LogInfo(text);
   }
-  if (result.not_finite > 0 && result.not_finite == count - result.outside) {
+  if (result.not_finite > 0 && result.not_finite == count - result.unlike_training) {
     return Error{ErrorCode::kBadFile,
                  "the network returned NaN or infinite values for every Gaussian: its weights are damaged"};
   }
@@ -227,13 +227,20 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
     }
     KeepMarked(keep, result.cloud);
   }
-  report.facts = {{"copies", network.config().copies},       {"unlike_training", result.outside},
-                  {"partly_unlike_training", result.partly}, {"output_not_finite", result.not_finite},
-                  {"blocks_resumed", result.resumed},        {"copies_made", result.made},
-                  {"merged", result.chosen.merged},          {"unseen", std::ssize(dust)},
-                  {"pruned", before - result.cloud.size()},  {"left_out", result.chosen.left_out},
-                  {"seconds_unseen", seconds_unseen},        {"seconds_neighbours", result.times.neighbours},
-                  {"seconds_network", result.times.network}, {"seconds_copies", result.times.copies},
+  report.facts = {{"copies", network.config().copies},
+                  {"unlike_training", result.unlike_training},
+                  {"partly_unlike_training", result.partly_unlike_training},
+                  {"output_not_finite", result.not_finite},
+                  {"blocks_resumed", result.resumed},
+                  {"copies_made", result.made},
+                  {"merged", result.chosen.merged},
+                  {"unseen", std::ssize(dust)},
+                  {"pruned", before - result.cloud.size()},
+                  {"left_out", result.chosen.left_out},
+                  {"seconds_unseen", seconds_unseen},
+                  {"seconds_neighbours", result.times.neighbours},
+                  {"seconds_network", result.times.network},
+                  {"seconds_copies", result.times.copies},
                   {"seconds_order", result.times.order}};
   return std::move(result.cloud);
 }

@@ -6,19 +6,23 @@
 
 namespace anchorsplat {
 
-// The method "model", which "auto" prefers to the filter where there is a network. What it works with is
-// EnhanceOptions::model; the last network is kept with the method for the next call.
+// The method "model", configured by EnhanceOptions::model. "auto" prefers it to the filter when a network is available.
+// Caches the last network it loaded.
 EnhanceMethod ModelMethod();
-// All that this program has, made once: those of enhance/enhance.h, and "model".
+// Every method of this program: those of enhance/enhance.h, and "model". Built once.
 const std::vector<EnhanceMethod>& AllMethods();
 
-// Enhances by a compact network, with a word in the log and in report.facts ("copies", "unlike_training",
-// "partly_unlike_training", "output_not_finite", "blocks_resumed", "copies_made", "merged", "unseen", "pruned",
-// "left_out", and "seconds_…" of its stages). Of `model` it looks at what chooses among its copies. kBadFile: it says
-// nothing finite about any Gaussian; kBadArgument: of ChooseCopies. A strength of no more than the closer view's own
-// pixels add means that there is no lost width to build on (a splat that is seen no closer, or has its width): it stays
-// as it is. A network that is not told the kind of splat knows classic ones; others are filtered. `control`: what its
-// blocks make is kept there (model/compact/compact_checkpoint.h). `stand_in`: see CompactTask.
+// Enhances a splat with a compact network. Writes a summary to the log and to report.facts: "copies",
+// "unlike_training", "partly_unlike_training", "output_not_finite", "blocks_resumed", "copies_made", "merged",
+// "unseen", "pruned", "left_out", and "seconds_…" per stage.
+//
+// The splat is returned unchanged when input.filter_strength is at most what the closer view's own pixels add
+// (ShownStrength): it has no lost width to restore. Splats whose kind the network was not trained for are filtered: a
+// network without `knows_kind` knows only classic ones.
+//
+// `model`: only the settings that choose among copies are used. `control`: where finished blocks are saved for resuming
+// (model/compact/compact_checkpoint.h). `stand_in`: see CompactTask.
+// Errors: kBadFile if no output of the network is finite; kBadArgument as Validate(CopyChoice).
 Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upscale, const CompactNetwork& network,
                                                 const ModelSettings& model, StepReport& report,
                                                 const RefineControl& control = {},

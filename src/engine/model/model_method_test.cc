@@ -232,7 +232,7 @@ TEST_F(SmallModel, CopiesAndBudgetAreCounted) {
   EXPECT_EQ(run(4, 0), -1);  // the network makes three
   EXPECT_EQ(run(3, 450), 450);
   EXPECT_EQ(run(3, 150), 150);
-  EXPECT_EQ(method.expected(200, options), 150);
+  EXPECT_EQ(method.expected_gaussians(200, options), 150);
 }
 
 // The last network is kept for the next call, and what asks for another one at the same time gets its own.
@@ -359,7 +359,7 @@ TEST_F(SmallModel, OneForOneComesFromANetworkOfItsOwn) {
   for (const Case& c : {Case{0.2, {}, 4, false}, Case{0.2, 1, 1, false}, Case{0.2, 4, 4, false}, Case{0.9, {}, 4, true},
                         Case{0.9, 1, 1, false}, Case{0.9, 2, 4, true}}) {
     EnhanceInput input = SheetInput();
-    input.showing = c.showing;
+    input.visible_share = c.showing;
     EnhanceOptions options;
     options.model.copies = c.copies;
     StepReport report;
@@ -379,7 +379,7 @@ TEST_F(SmallModel, WhatAMergeMayCostDependsOnTheNetwork) {
   if (!HasShippedNetwork()) GTEST_SKIP() << "this program was built without weights";
   const auto made = [](double showing, bool is_refined, std::optional<double> cost) {
     EnhanceInput input = SheetInput();
-    input.showing = showing;
+    input.visible_share = showing;
     input.is_refined = is_refined;
     EnhanceOptions options;
     options.model.merge_cost = cost;

@@ -28,12 +28,12 @@ namespace anchorsplat {
 namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-constexpr int64_t kMostOfStatistics = 20'000;  // Gaussians: quantiles of more are the same
+constexpr int64_t kMostOfStatistics = 20'000;  // Gaussians; more do not change the quantiles
 constexpr int64_t kMostOfNeighbours = 3'000;
-constexpr double kLeastDifference = 0.02;  // below that, formats round
+constexpr double kLeastDifference = 0.02;  // smaller differences are rounding of formats
 constexpr double kLeastLength = -12;       // ln of the unit
 
-// Either the names or the values, in one order.
+// Collects either names or values, in the same order.
 class Row {
  public:
   explicit Row(std::vector<std::string>& names) : names_(&names) {}
@@ -43,7 +43,7 @@ class Row {
     if (names_ != nullptr) names_->emplace_back(name);
     if (values_ != nullptr) values_->push_back(std::isfinite(value) ? value : kUnknown);
   }
-  // Flat ones count as being of kLeastLength.
+  // Flat Gaussians count as kLeastLength.
   void AddLogLength(std::string_view name, double log_length) {
     Add(name, std::max(log_length - log_unit_, kLeastLength));
   }
@@ -54,7 +54,7 @@ class Row {
   double log_unit_ = 0;
 };
 
-// Values of every so many Gaussians, with weights.
+// Weighted values of a sample of Gaussians.
 struct Weighted {
   std::vector<std::pair<float, float>> items;
   double total = 0;
@@ -64,7 +64,7 @@ struct Weighted {
     items.emplace_back(value, weight);
     total += double{weight};
   }
-  // At which a share of the weight is reached.
+  // Value at which this share of the weight is reached.
   double Quantile(double share) {
     if (items.empty()) return kUnknown;
     if (!sorted) std::sort(items.begin(), items.end());
@@ -78,7 +78,7 @@ struct Weighted {
   }
 };
 
-// ln of the axes, the smallest first.
+// ln of the axes, smallest first.
 std::array<float, 3> SortedAxes(const GaussianCloud& cloud, size_t i) {
   std::array<float, 3> axes;
   std::copy_n(cloud.log_scales.data() + 3 * i, 3, axes.begin());
@@ -87,27 +87,27 @@ std::array<float, 3> SortedAxes(const GaussianCloud& cloud, size_t i) {
 }
 
 struct Gaussians {
-  // Of a sample of those that show, each rising: ln of the axes, the smallest first; opacity, its logit.
+  // Sorted samples of visible Gaussians: ln of the axes, smallest first; opacity and its logit.
   std::array<Buffer<float>, 3> axes;
   Buffer<float> opacities, logits;
-  std::vector<std::pair<float, float>> areas;  // rising: ln of middle × largest axis, opacity
-  std::array<Weighted, 4> weighted;            // ln of the axes, opacity; by opacity × area
+  std::vector<std::pair<float, float>> areas;  // sorted: ln(middle × largest axis), opacity
+  std::array<Weighted, 4> weighted;            // ln of the axes, then opacity; weights opacity × area
 };
 
-Gaussians SampleStored(const GaussianCloud& showing) {
+Gaussians SampleStored(const GaussianCloud& visible) {
   Gaussians out;
-  const int64_t step = std::max<int64_t>(1, showing.size() / kMostOfStatistics);
-  for (int64_t row = 0; row < showing.size(); row += step) {
+  const int64_t step = std::max<int64_t>(1, visible.size() / kMostOfStatistics);
+  for (int64_t row = 0; row < visible.size(); row += step) {
     const auto i = static_cast<size_t>(row);
-    const std::array<float, 3> own = SortedAxes(showing, i);
-    const float opacity = Sigmoid(showing.opacity_logits[i]);
+    const std::array<float, 3> own = SortedAxes(visible, i);
+    const float opacity = Sigmoid(visible.opacity_logits[i]);
     const float weight = opacity * std::exp(own[1] + own[2]);
     for (size_t a = 0; a < 3; ++a) {
       if (std::isfinite(own[a])) out.axes[a].push_back(own[a]);
     }
     out.opacities.push_back(opacity);
     out.areas.emplace_back(own[1] + own[2], opacity);
-    out.logits.push_back(std::clamp(showing.opacity_logits[i], -20.0f, 20.0f));
+    out.logits.push_back(std::clamp(visible.opacity_logits[i], -20.0f, 20.0f));
     if (!(weight > 0) || !std::isfinite(weight)) continue;
     for (size_t a = 0; a < 3; ++a) out.weighted[a].Add(std::max(own[a], -80.0f), weight);
     out.weighted[3].Add(opacity, weight);
@@ -128,7 +128,7 @@ double SortedQuantile(std::span<const float> sorted, double q) {
   return double{sorted[low]} * (1 - part) + double{sorted[high]} * part;
 }
 
-// How far the least `share` lies below its quantile, in the mean.
+// Mean distance of the smallest `share` below its quantile.
 double Tail(std::span<const float> sorted, double share) {
   const double quantile = SortedQuantile(sorted, share);
   double sum = 0;
@@ -139,7 +139,7 @@ double Tail(std::span<const float> sorted, double share) {
   return sum / (share * static_cast<double>(std::max<size_t>(1, sorted.size())));
 }
 
-// The share of the values that are the most common one, within a thousandth: what a program set to one value.
+// Share of values equal to the most common one (within a thousandth), as when a program set them.
 double ShareOfTheSame(std::span<const float> sorted) {
   if (sorted.empty()) return kUnknown;
   constexpr float kSame = 1e-3f;
@@ -151,7 +151,7 @@ double ShareOfTheSame(std::span<const float> sorted) {
   return static_cast<double>(most) / static_cast<double>(sorted.size());
 }
 
-// The share that lies within a step of a format above the least.
+// Share within one format quantization step of the minimum.
 double ShareOfTheLeast(std::span<const float> sorted) {
   constexpr float kStep = 0.07f;
   if (sorted.empty()) return kUnknown;
@@ -166,13 +166,13 @@ void AddFile(const CloudView& whole, Row& row) {
   row.Add("file.sh_degree", whole.sh_degree);
 }
 
-// Neither their number nor the size of the whole: fits to pictures of one size have one of each, others another.
-void AddCounts(const ShowingGaussians& showing, Row& row) {
+// Leaves out counts and overall size: they are equal for all fits of one data set, and differ between data sets.
+void AddCounts(const VisibleGaussians& visible, Row& row) {
   const auto count = [](int64_t n) { return static_cast<double>(std::max<int64_t>(1, n)); };
-  const int64_t shown = showing.all.size();
-  row.Add("count.share_showing", static_cast<double>(shown) / count(showing.telling.cloud.size()));
+  const int64_t shown = visible.cloud.size();
+  row.Add("count.share_showing", static_cast<double>(shown) / count(visible.central.cloud.size()));
   int64_t black = 0;
-  for (size_t i = 0; i < showing.all.opacity_logits.size(); ++i) black += IsNearlyBlack(showing.all, i) ? 1 : 0;
+  for (size_t i = 0; i < visible.cloud.opacity_logits.size(); ++i) black += IsNearlyBlack(visible.cloud, i) ? 1 : 0;
   row.Add("count.share_bright", static_cast<double>(shown - black) / count(shown));
 }
 
@@ -208,7 +208,7 @@ void AddAxes(const Gaussians& sample, Row& row) {
   }
 }
 
-// How opacity goes with size.
+// Opacity as a function of size.
 void AddOpacityBySize(const Gaussians& sample, Row& row) {
   const auto& items = sample.areas;
   for (size_t fifth = 0; fifth < 5; ++fifth) {
@@ -224,11 +224,11 @@ void AddOpacityBySize(const Gaussians& sample, Row& row) {
   }
 }
 
-void AddColorsAndTurns(const CloudView& whole, const ShowingGaussians& showing, Row& row) {
+void AddColorsAndTurns(const CloudView& whole, const VisibleGaussians& visible, Row& row) {
   double outside = 0, constant = 0, rest = 0, lengths = 0, count = 0;
-  const auto step = std::max<size_t>(1, showing.rows_of_all.size() / kMostOfStatistics);
-  for (size_t n = 0; n < showing.rows_of_all.size(); n += step) {
-    const int64_t i = showing.rows_of_all[n];
+  const auto step = std::max<size_t>(1, visible.rows.size() / kMostOfStatistics);
+  for (size_t n = 0; n < visible.rows.size(); n += step) {
+    const int64_t i = visible.rows[n];
     const float* const sh = whole.sh.data() + i * whole.sh_stride();
     bool out = false;
     for (int64_t k = 0; k < whole.sh_stride(); ++k) {
@@ -246,8 +246,8 @@ void AddColorsAndTurns(const CloudView& whole, const ShowingGaussians& showing, 
   row.Add("turn.lengths", std::log(lengths / count + 1e-3));
 }
 
-// The logarithm of a Gaussian's covariance, halved: its log-scales along its own axes. xx, yy, zz, √2·xy, √2·xz, √2·yz,
-// so that differences have the norm of the matrix.
+// Half the matrix logarithm of the covariance (log-scales along the axes): xx, yy, zz, √2·xy, √2·xz, √2·yz, so that the
+// vector norm of differences is their matrix norm.
 std::array<double, 6> LogCovariance(const GaussianCloud& cloud, size_t i, const std::array<double, 9>& r) {
   const float* s = cloud.log_scales.data() + 3 * i;
   const auto entry = [&](size_t a, size_t b) {
@@ -270,7 +270,7 @@ double Difference(const std::array<double, 6>& a, const std::array<double, 6>& b
   return std::sqrt(sum);
 }
 
-// From i to j, in standard deviations of i.
+// Distance from i to j in standard deviations of i.
 double Deviations(const GaussianCloud& cloud, size_t i, size_t j, const std::array<double, 9>& r) {
   double sum = 0;
   for (size_t a = 0; a < 3; ++a) {
@@ -284,7 +284,7 @@ double Deviations(const GaussianCloud& cloud, size_t i, size_t j, const std::arr
   return std::min(1e6, std::sqrt(sum));
 }
 
-// Angle between two, radians.
+// Rotation angle between two Gaussians, radians.
 double TurnBetween(const GaussianCloud& cloud, size_t i, size_t j) {
   double product = 0, of_i = 0, of_j = 0;
   for (size_t k = 0; k < 4; ++k) {
@@ -297,7 +297,7 @@ double TurnBetween(const GaussianCloud& cloud, size_t i, size_t j) {
   return norms > 0 ? 2 * std::acos(std::min(1.0, std::abs(product) / norms)) : 0;
 }
 
-// Cosine between harmonics of degree 2 and 3: a network multiplies those of a Gaussian for all of its copies.
+// Cosine between SH of degrees 2 and 3: a network scales those of a Gaussian for all its copies.
 double LikenessOfHarmonics(const CloudView& whole, int64_t a, int64_t b) {
   const auto first = 3 * static_cast<size_t>(ShCoefficients(1)), stride = static_cast<size_t>(whole.sh_stride());
   const float* const x = whole.sh.data() + static_cast<size_t>(a) * stride;
@@ -313,14 +313,14 @@ double LikenessOfHarmonics(const CloudView& whole, int64_t a, int64_t b) {
 }
 
 struct Neighbours {
-  std::array<Buffer<float>, 3> difference;                  // of the likest three of eight, rising
-  Buffer<float> distance, color, opacity, turn, harmonics;  // to the likest
-  Buffer<float> side, wide;  // of the square that each has of the surface, of 8 and of 64; ln
+  std::array<Buffer<float>, 3> difference;                  // of the three most similar of eight, sorted
+  Buffer<float> distance, color, opacity, turn, harmonics;  // to the most similar
+  Buffer<float> side, wide;  // side of the square of surface per Gaussian, from 8 and from 64 neighbours; ln
   Buffer<float> own;         // ln √(largest × middle axis) over `side`
 };
 
-Neighbours NeighboursOf(const CloudView& whole, const ShowingGaussians& showing) {
-  const GaussianCloud& cloud = showing.all;
+Neighbours NeighboursOf(const CloudView& whole, const VisibleGaussians& visible) {
+  const GaussianCloud& cloud = visible.cloud;
   const KdTree tree(cloud.means);
   const auto samples = std::min(kMostOfNeighbours, tree.size());
   const auto count = static_cast<size_t>(samples);
@@ -333,7 +333,7 @@ Neighbours NeighboursOf(const CloudView& whole, const ShowingGaussians& showing)
   ParallelFor(0, samples, kPerTask, [&](int64_t begin, int64_t end) {
     for (int64_t k = begin; k < end; ++k) {
       const auto at = static_cast<size_t>(k);
-      // Places of the tree, and not rows: files may be in any order.
+      // Samples by tree order, not rows, because files may be in any order.
       const int64_t place = k * tree.size() / samples;
       const auto own = static_cast<size_t>(tree.PointAt(place));
       std::array<KdTree::Neighbour, 64> nearest{};
@@ -366,15 +366,14 @@ Neighbours NeighboursOf(const CloudView& whole, const ShowingGaussians& showing)
       out.opacity[at] = std::abs(std::clamp(cloud.opacity_logits[own], -10.0f, 10.0f) -
                                  std::clamp(cloud.opacity_logits[twin], -10.0f, 10.0f));
       if (whole.sh_degree >= 2) {
-        out.harmonics[at] =
-            static_cast<float>(LikenessOfHarmonics(whole, showing.rows_of_all[own], showing.rows_of_all[twin]));
+        out.harmonics[at] = static_cast<float>(LikenessOfHarmonics(whole, visible.rows[own], visible.rows[twin]));
       }
     }
   });
   return out;
 }
 
-// Known ones, sorted.
+// The values that are not NaN, sorted.
 std::span<float> Known(Buffer<float>& values) {
   std::erase_if(values, [](float x) { return !std::isfinite(x); });
   std::ranges::sort(values);
@@ -409,17 +408,17 @@ void AddNeighbours(Neighbours neighbours, Row& row) {
   for (const double q : {0.1, 0.5, 0.9}) row.Add(Cat("near.own.", q), SortedQuantile(own, q));
 }
 
-// Standard deviations along the principal axes, over the largest.
-void AddShape(const GaussianCloud& showing, Row& row) {
+// Standard deviations along the principal axes, relative to the largest.
+void AddShape(const GaussianCloud& visible, Row& row) {
   std::array<double, 3> mean{};
   std::array<double, 6> moments{};
-  const auto count = static_cast<double>(std::max<int64_t>(1, showing.size()));
-  for (int64_t i = 0; i < showing.size(); ++i) {
-    for (size_t a = 0; a < 3; ++a) mean[a] += double{showing.means[static_cast<size_t>(3 * i) + a]} / count;
+  const auto count = static_cast<double>(std::max<int64_t>(1, visible.size()));
+  for (int64_t i = 0; i < visible.size(); ++i) {
+    for (size_t a = 0; a < 3; ++a) mean[a] += double{visible.means[static_cast<size_t>(3 * i) + a]} / count;
   }
-  for (int64_t i = 0; i < showing.size(); ++i) {
+  for (int64_t i = 0; i < visible.size(); ++i) {
     std::array<double, 3> d;
-    for (size_t a = 0; a < 3; ++a) d[a] = double{showing.means[static_cast<size_t>(3 * i) + a]} - mean[a];
+    for (size_t a = 0; a < 3; ++a) d[a] = double{visible.means[static_cast<size_t>(3 * i) + a]} - mean[a];
     const std::array<double, 6> products = {d[0] * d[0], d[0] * d[1], d[0] * d[2],
                                             d[1] * d[1], d[1] * d[2], d[2] * d[2]};
     for (size_t k = 0; k < 6; ++k) moments[k] += products[k] / count;
@@ -448,16 +447,16 @@ void AddPictures(const SplatPictures& pictures, Row& row) {
   }
 }
 
-void AddAll(const CloudView& whole, const ShowingGaussians& showing, const SplatPictures& pictures, Gaussians sample,
+void AddAll(const CloudView& whole, const VisibleGaussians& visible, const SplatPictures& pictures, Gaussians sample,
             Neighbours neighbours, Row& row) {
   AddFile(whole, row);
-  AddCounts(showing, row);
+  AddCounts(visible, row);
   AddSizes(sample, row);
   AddAxes(sample, row);
   AddOpacityBySize(sample, row);
-  AddColorsAndTurns(whole, showing, row);
+  AddColorsAndTurns(whole, visible, row);
   AddNeighbours(std::move(neighbours), row);
-  AddShape(showing.all, row);
+  AddShape(visible.cloud, row);
   AddPictures(pictures, row);
 }
 
@@ -478,22 +477,22 @@ Result<SplatFeatures> FeaturesOf(const CloudView& whole, const ShowingGaussians&
     return Error{ErrorCode::kBadArgument, Cat("fewer than ", kLeastGaussians, " visible, small Gaussians")};
   }
   LeaveIfAbandoned();
-  Gaussians sample = SampleStored(showing.all);
+  Gaussians sample = SampleStored(visible.cloud);
   // √(largest × middle axis) of their 10 % quantiles.
   const double unit = std::exp(0.5 * (sample.weighted[1].Quantile(0.1) + sample.weighted[2].Quantile(0.1)));
   if (!(unit > 0) || !std::isfinite(unit)) {
     return Error{ErrorCode::kBadArgument, "the visible Gaussians have zero size"};
   }
   LeaveIfAbandoned();
-  Neighbours neighbours = NeighboursOf(whole, showing);
+  Neighbours neighbours = NeighboursOf(whole, visible);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SplatPictures pictures,
-                               with_pictures ? LookAt(showing.telling, unit) : UnknownPictures());
+                               with_pictures ? MeasurePictures(visible.central, unit) : UnknownPictures());
   SplatFeatures features{unit, {}};
   Row row(features.values, unit);
-  AddAll(whole, showing, pictures, std::move(sample), std::move(neighbours), row);
+  AddAll(whole, visible, pictures, std::move(sample), std::move(neighbours), row);
   return features;
 }
 
-Result<SplatFeatures> FeaturesOf(const CloudView& whole) { return FeaturesOf(whole, FindShowingGaussians(whole)); }
+Result<SplatFeatures> FeaturesOf(const CloudView& whole) { return FeaturesOf(whole, FindVisibleGaussians(whole)); }
 
 }  // namespace anchorsplat

@@ -31,14 +31,14 @@ void NearestGaussians::Add(const std::vector<Item>& items) {
   const size_t room = most_ + most_ / 2 + 2;
   for (const Item& item : items) {
     if (item.squared_distance > farthest()) continue;
-    // Doubling would take twice the memory while it moves.
+    // Not doubled: that would take twice the memory while moving.
     if (items_.size() == items_.capacity()) items_.reserve(std::min(room, 2 * items_.size() + items.size()));
     items_.push_back(item);
     if (items_.size() >= room) Cut();
   }
 }
 
-// One more than the most are kept, so that it is known how far away the next one is.
+// Keeps one more than `most`, so that Take knows the distance of the next one.
 void NearestGaussians::Cut() {
   if (items_.size() <= most_ + 1) return;
   const auto last = items_.begin() + static_cast<std::ptrdiff_t>(most_);

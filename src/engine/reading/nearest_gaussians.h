@@ -14,28 +14,28 @@
 
 namespace anchorsplat {
 
-// The Gaussians nearest to a point, of any number that are shown: memory for half as many more as are wanted. Which
-// ones they are does not depend on the order in which they are shown: of equally far ones the first rows.
+// Collects the `most` Gaussians nearest to a point from a stream of any length, in memory for 1.5 · most. The result
+// does not depend on the order of the stream: ties go to the first rows.
 class NearestGaussians {
  public:
   explicit NearestGaussians(size_t most) : most_(most) {}
 
-  // A Gaussian with its place.
+  // A Gaussian and its place.
   struct Item {
     double squared_distance = 0;
     int64_t row = 0;  // of the whole cloud
-    // Mean, log-scales, quaternion, opacity logit, constant colour.
+    // Mean, log-scales, quaternion, opacity logit, SH DC.
     std::array<float, 14> values{};
   };
   static Item ItemOf(double squared_distance, int64_t row, const CloudView& rows, size_t i);
 
-  // One that is farther is none of the nearest. From any thread; falls while Gaussians are added.
+  // Squared distance beyond which a Gaussian is not among the nearest. Decreases as items are added. Thread-safe.
   double farthest() const { return farthest_.load(std::memory_order_relaxed); }
-  void Add(const std::vector<Item>& items);  // from any thread
+  void Add(const std::vector<Item>& items);  // thread-safe
 
-  size_t count() const { return seen_; }  // that were added, while they were no more than the most
-  // The nearest, in the order of rows, without harmonics; gives the memory back. `next`: the squared distance of the
-  // nearest one that is not among them. `rows`: which they are.
+  size_t count() const { return seen_; }  // items added; exact only up to `most`
+  // Returns the nearest in row order, without harmonics, and frees the memory. `next`: receives the squared distance of
+  // the nearest Gaussian not included. `rows`: receives their rows.
   GaussianCloud Take(std::optional<double>* next = nullptr, std::vector<int64_t>* rows = nullptr);
 
  private:

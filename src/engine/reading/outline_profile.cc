@@ -10,12 +10,12 @@ namespace anchorsplat {
 
 namespace {
 constexpr int kProfileRowsPerTask = 32;
-constexpr float kLeastGradient = 1e-4f;  // per pixel; flatter crossings are noise of a plateau
+constexpr float kLeastGradient = 1e-4f;  // per pixel; flatter crossings are noise on a plateau
 constexpr int kStretch = 16;             // px
 constexpr float kLeftOutShare = 0.2f;    // of alpha
 
-// Most of a picture is empty or opaque: false where a stretch of a row, with the pixels to its right and `below` it,
-// has neither a level nor a band.
+// Quick test for stretches of a row, with the pixels to the right and `below`: false if they have no level and no band.
+// Most of a picture is empty or opaque.
 bool MayShow(const float* at, int below) {
   float low = at[0], high = at[0];
   for (int x = 0; x <= kStretch; ++x) {

@@ -7,46 +7,44 @@
 
 namespace anchorsplat {
 
-// How soft the outlines in pictures of alpha are: the world length in which alpha rises, in units of a given length.
+// Measures the softness of outlines in alpha pictures: the world length over which alpha rises, in a given unit.
 //
-// Where the line between two neighbouring pixels crosses a level, alpha's gradient there (central differences, linear
-// between the two) says how wide the outline would be if it went on rising like that: 1 / |∇α|. Crossings count by how
-// straight the line crosses, so that outlines of all directions count by their length.
+// At each point where the line between two neighbouring pixels crosses a level, the outline's width is 1 / |∇α|, from
+// central differences interpolated linearly between the two. Crossings are weighted by how perpendicular the line
+// crosses the outline, so outlines of all directions count by their length.
 inline constexpr std::array<float, 4> kOutlineLevels = {0.25f, 0.5f, 0.75f, 0.9f};
 inline constexpr std::array<double, 4> kOutlineQuantiles = {0.1, 0.25, 0.5, 0.75};
-// Bands of alpha, whose areas over the outline's length say how wide outlines are on average, thin and translucent
-// parts included.
+// Alpha bands. A band's area over the outline's length is the mean width of outlines, thin and translucent parts
+// included.
 inline constexpr std::array<float, 9> kOutlineBands = {0.02f, 0.1f, 0.3f, 0.5f, 0.7f, 0.85f, 0.95f, 0.985f, 0.997f};
 
 inline constexpr size_t kOutlineValues = kOutlineLevels.size() * kOutlineQuantiles.size() + (kOutlineBands.size() - 1);
 
 class OutlineProfile {
  public:
-  // Adds a picture, [1,H,W] or the first channel of one, whose pixels have the side `pixel` in units of the length. The
-  // outermost pixels only serve differences. Bit-identical for any number of threads. `cut`, `coarse`: [H,W], how much
-  // of alpha is of Gaussians that were cut, and of others that are coarse; what they have a fifth of is left out.
+  // Adds a picture: [1,H,W], or the first channel of more. `pixel`: its pixel side in units of the length. The
+  // outermost pixels only serve differences. `cut`, `coarse`: [H,W], alpha due to cut and to coarse Gaussians; where
+  // that exceeds a fifth of alpha the outline is excluded. The same bits for any number of threads.
   void Add(const Image& alpha, double pixel, const float* cut = nullptr, const float* coarse = nullptr);
 
-  // Share of the outlines, by their length at ½, that was left out because of those that were cut, and because of the
-  // coarse ones alone.
+  // Shares of the outlines' length at alpha ½ that were excluded: due to cut Gaussians, due to coarse ones alone.
   double Cut() const { return ShareOf(cut_); }
   double Coarse() const { return ShareOf(coarse_); }
 
-  // Natural logarithms: per level the quantiles of the widths, then per band area / (length of the outline at ½ × width
-  // of the band). 0 for a level that is crossed nowhere; areas and lengths have one pixel more than there are, so that
-  // they are finite.
+  // Natural logarithms: per level the width quantiles, then per band area / (outline length at ½ × band width). 0 for a
+  // level that is never crossed. Areas and lengths count one extra pixel, to stay finite.
   std::array<double, kOutlineValues> Values() const;
 
  private:
-  // Widths on a logarithmic scale from e^kFirst in steps of kStep; what lies beyond counts at the ends.
+  // Log-scale histogram of widths from e^kFirst in steps of kStep; the end bins include everything beyond.
   static constexpr double kFirst = -4, kStep = 0.05;
   static constexpr size_t kBins = 180;
 
   struct Sums {
     std::array<std::array<double, kBins>, kOutlineLevels.size()> widths{};  // weights
     std::array<int64_t, kOutlineBands.size() - 1> pixels{};                 // per band
-    int64_t crossings = 0;                                                  // of ½
-    int64_t cut = 0, coarse = 0;                                            // left out
+    int64_t crossings = 0;                                                  // of level ½
+    int64_t cut = 0, coarse = 0;                                            // excluded crossings
   };
   struct LeftOut {
     const float* cut;

@@ -13,22 +13,22 @@
 #include "core/statistics.h"
 #include "reading/features.h"
 #include "reading/reading_model.h"
-#include "reading/showing_gaussians.h"
+#include "reading/visible_gaussians.h"
 
 namespace anchorsplat {
 
 namespace {
 
 constexpr int64_t kMostPlaces = 64;
-constexpr int64_t kOfPlace = 1000;       // Gaussians that show, in each at least
-constexpr int64_t kMostOfPlace = 4000;   // that are looked at
-constexpr size_t kMostOfTree = 1 << 19;  // Gaussians: enough to tell where places are
-constexpr size_t kAround = 16;           // Gaussians whose places are averaged
+constexpr int64_t kOfPlace = 1000;       // minimum visible Gaussians per place
+constexpr int64_t kMostOfPlace = 4000;   // Gaussians read per place
+constexpr size_t kMostOfTree = 1 << 19;  // Gaussians that define the places
+constexpr size_t kAround = 16;           // neighbours to average over
 
 std::vector<int64_t> RowsThatShow(const CloudView& cloud) {
   std::vector<int64_t> rows;
   for (int64_t i = 0; i < cloud.size(); ++i) {
-    if (Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]) >= kShowingOpacity && IsUsable(cloud, i)) {
+    if (Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]) >= kVisibleOpacity && IsUsable(cloud, i)) {
       rows.push_back(i);
     }
   }
@@ -42,15 +42,16 @@ void Extend(Bounds& box, const float* at, bool is_first) {
   }
 }
 
-// All that shows in each box, not only those of which the tree was made: how near neighbours are says something. In
-// boxes without size, as of Gaussians in one place, there may be any number.
-void FillBoxes(const CloudView& cloud, std::span<const int64_t> showing, std::span<const Bounds> boxes,
+// Fills each box with all visible Gaussians in it, not just those of the tree: the distances of neighbours are a
+// feature.
+// A box without extent (Gaussians at one point) may hold any number.
+void FillBoxes(const CloudView& cloud, std::span<const int64_t> visible, std::span<const Bounds> boxes,
                std::vector<std::vector<int64_t>>& rows) {
   ParallelFor(0, std::ssize(boxes), 1, [&](int64_t place, int64_t) {
     const Bounds& box = boxes[static_cast<size_t>(place)];
     std::vector<int64_t>& inside = rows[static_cast<size_t>(place)];
     inside.clear();
-    for (const int64_t row : showing) {
+    for (const int64_t row : visible) {
       if (std::ssize(inside) == 2 * kMostOfPlace) break;
       const float* const at = cloud.means.data() + 3 * row;
       bool is_inside = true;
@@ -60,26 +61,28 @@ void FillBoxes(const CloudView& cloud, std::span<const int64_t> showing, std::sp
   });
 }
 
-// NaN: it cannot be read.
+// ln of the predicted pixel of a place; NaN if it cannot be read.
 double LogPixelOf(const CloudView& cloud, std::span<const int64_t> rows, const ReadingModel& model) {
   constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   const auto part = Subset(cloud, rows);
   if (!part.ok()) return kUnknown;
-  const auto features = FeaturesOf(*part, FindShowingGaussians(*part), /*with_pictures=*/false);
+  const auto features = FeaturesOf(*part, FindVisibleGaussians(*part), /*with_pictures=*/false);
   if (!features.ok()) return kUnknown;
-  const std::vector<ReadingOpinion> opinions = model.OpinionsOf(features->values);
+  const std::vector<ReadingPrediction> predictions = model.Predict(features->values);
   double sum = std::log(features->unit);
-  for (const ReadingOpinion& opinion : opinions) sum += opinion.log_pixel / static_cast<double>(opinions.size());
+  for (const ReadingPrediction& prediction : predictions)
+    sum += prediction.log_pixel / static_cast<double>(predictions.size());
   return sum;
 }
 
-// ln(pixels) to ln(pixels / median), shrunk by the share of their variance that errors explain. False: all of it.
+// Turns ln(pixels) into ln(pixels / median), shrunk by the share of their variance that errors explain. False if errors
+// explain all of it.
 bool KeepWhatDiffers(double error, std::vector<double>& pixels) {
   const auto count = static_cast<double>(pixels.size());
   double mean = 0, variance = 0;
   for (const double pixel : pixels) mean += pixel / count;
   for (const double pixel : pixels) variance += (pixel - mean) * (pixel - mean) / count;
-  if (!(variance > error * error)) return false;  // not for NaN either
+  if (!(variance > error * error)) return false;  // also for NaN
   Buffer<float> sorted;
   for (const double pixel : pixels) sorted.push_back(static_cast<float>(pixel));
   const double median{Quantile(sorted, 0.5)}, share = 1 - error * error / variance;
@@ -90,18 +93,18 @@ bool KeepWhatDiffers(double error, std::vector<double>& pixels) {
 }  // namespace
 
 SplatPlaces::SplatPlaces(const CloudView& cloud) {
-  const std::vector<int64_t> showing = RowsThatShow(cloud);
-  const int64_t count = std::min(kMostPlaces, std::ssize(showing) / kOfPlace);
+  const std::vector<int64_t> visible = RowsThatShow(cloud);
+  const int64_t count = std::min(kMostPlaces, std::ssize(visible) / kOfPlace);
   if (count < 2) return;
-  const size_t step = 1 + showing.size() / kMostOfTree;
+  const size_t step = 1 + visible.size() / kMostOfTree;
   Buffer<float> means;
-  for (size_t k = 0; k < showing.size(); k += step) {
-    const float* const mean = cloud.means.data() + 3 * showing[k];
+  for (size_t k = 0; k < visible.size(); k += step) {
+    const float* const mean = cloud.means.data() + 3 * visible[k];
     means.insert(means.end(), mean, mean + 3);
   }
   tree_ = std::make_unique<KdTree>(means);
   rows_.resize(static_cast<size_t>(count));
-  // The order of the tree is one of halves of halves: equal parts of it lie together.
+  // The tree's order is by recursive halving, so equal consecutive parts are spatially compact.
   std::vector<Bounds> boxes(rows_.size());
   for (int64_t place = 0; place < count; ++place) {
     std::vector<int64_t>& rows = rows_[static_cast<size_t>(place)];
@@ -112,12 +115,12 @@ SplatPlaces::SplatPlaces(const CloudView& cloud) {
     }
     for (int64_t at = begin; at < end; ++at) {
       const auto k = static_cast<size_t>(tree_->PointAt(at));
-      rows.push_back(showing[k * step]);
+      rows.push_back(visible[k * step]);
       Extend(boxes[static_cast<size_t>(place)], means.data() + 3 * k, at == begin);
     }
     std::ranges::sort(rows);
   }
-  if (step > 1) FillBoxes(cloud, showing, boxes, rows_);
+  if (step > 1) FillBoxes(cloud, visible, boxes, rows_);
 }
 
 Buffer<float> SplatPlaces::Spread(std::span<const double> of_places, std::span<const float> means) const {

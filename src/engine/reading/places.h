@@ -13,29 +13,30 @@ namespace anchorsplat {
 
 class ReadingModel;
 
-// Parts of a splat, each with about as many of the Gaussians that show. Training pixels differ from place to place
-// where cameras saw some from near and some from afar, as in photographs, and a splat says so (docs/reading.md).
+// Divides a splat into places with about equal numbers of visible Gaussians. In photographs cameras see some places
+// from near and others from afar, so training pixels differ from place to place, and the splat shows it
+// (docs/reading.md).
 class SplatPlaces {
  public:
   explicit SplatPlaces(const CloudView& cloud);
 
-  int64_t count() const { return std::ssize(rows_); }  // 0: too little shows to tell places apart
-  // Rows of the cloud that show there; of many those that lie together.
+  int64_t count() const { return std::ssize(rows_); }  // 0: too few visible Gaussians for several places
+  // Rows of the cloud that are visible there; if there are many, a subset that lies close together.
   const std::vector<int64_t>& rows(int64_t place) const { return rows_[static_cast<size_t>(place)]; }
 
-  // For means [N,3] the values [count()] of the places around, averaged over the nearest Gaussians: without steps.
+  // Interpolates one value per place to means [N,3]: averages over the nearest Gaussians, so without steps.
   Buffer<float> Spread(std::span<const double> of_places, std::span<const float> means) const;
 
  private:
   int64_t PlaceAt(int64_t place_of_tree) const { return place_of_tree * count() / tree_->size(); }
 
-  std::unique_ptr<KdTree> tree_;  // of Gaussians that show
+  std::unique_ptr<KdTree> tree_;  // of visible Gaussians
   std::vector<std::vector<int64_t>> rows_;
 };
 
-// [N] training pixels over that of most places, as the places say them, seen without pictures. What differs less from
-// place to place than what is said of places whose pixels are one (Stein's estimate: ReadingModel::place_error) differs
-// by nothing: empty. Empty, too, where no places are told apart or one cannot be read.
+// Ratio [N] of each Gaussian's training pixel to the median place's, predicted per place without pictures. Variation
+// smaller than the prediction error (Stein's estimate: ReadingModel::place_error) is treated as none. Empty if there is
+// none, if places are not distinguished, or if one cannot be read.
 Buffer<float> PixelRatios(const CloudView& cloud, const ReadingModel& model);
 
 }  // namespace anchorsplat

@@ -22,8 +22,8 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr float kMostDeviations = 4;  // that count, of a feature
-constexpr size_t kOpinionValues = 2 + kMadeCount + 2 * kGainCount * kGainMultiples.size();
+constexpr float kMostDeviations = 4;  // standardised features are clamped to this
+constexpr size_t kPredictionValues = 2 + kProvenanceCount + 2 * kGainCount * kGainMultiples.size();
 
 float Silu(float x) { return x / (1 + std::exp(-x)); }
 
@@ -32,30 +32,30 @@ Result<std::vector<float>> ReadAll(const TensorFile& file, std::string_view name
   return std::vector<float>(values.values().begin(), values.values().end());
 }
 
-ReadingOpinion OpinionFrom(std::span<const float> said) {
-  ReadingOpinion opinion;
+ReadingPrediction PredictionFrom(std::span<const float> said) {
+  ReadingPrediction prediction;
   auto next = said.begin();
-  opinion.log_pixel = double{*next++};
-  opinion.log_spread = std::clamp(double{*next++}, -3.5, 1.0);
-  for (double& logit : opinion.logits) logit = double{*next++};
-  for (auto& curve : opinion.gains) {
+  prediction.log_pixel = double{*next++};
+  prediction.log_spread = std::clamp(double{*next++}, -3.5, 1.0);
+  for (double& logit : prediction.logits) logit = double{*next++};
+  for (auto& curve : prediction.gains) {
     for (double& gain : curve) gain = double{*next++};
   }
-  for (auto& curve : opinion.log_deviations) {
+  for (auto& curve : prediction.log_deviations) {
     for (double& deviation : curve) deviation = std::clamp(double{*next++}, -3.0, 2.0);
   }
-  return opinion;
+  return prediction;
 }
 
 }  // namespace
 
-std::string_view NameOf(Made made) {
-  constexpr std::array<std::string_view, kMadeCount> kNames = {"classic",  "antialiased", "mip",  "filtered",
-                                                               "enhanced", "raised",      "mesh", "generated"};
+std::string_view NameOf(Provenance made) {
+  constexpr std::array<std::string_view, kProvenanceCount> kNames = {"classic",  "antialiased", "mip",  "filtered",
+                                                                     "enhanced", "raised",      "mesh", "generated"};
   return kNames[static_cast<size_t>(made)];
 }
 
-std::string_view InWords(Made made) {
+std::string_view Describe(Provenance made) {
   switch (made) {
     case Made::kClassic:
       return "a classic 3DGS fit";
@@ -77,8 +77,9 @@ std::string_view InWords(Made made) {
   return "";
 }
 
-bool HasItsWidth(Made made) {
-  return made == Made::kMip || made == Made::kFiltered || made == Made::kEnhanced || made == Made::kMesh;
+bool HasFullWidth(Provenance made) {
+  return made == Provenance::kMip || made == Provenance::kFiltered || made == Provenance::kEnhanced ||
+         made == Provenance::kMesh;
 }
 
 double SquashGain(double decibels) { return 2 * std::asinh(decibels / 2); }
@@ -118,8 +119,9 @@ Result<ReadingModel> ReadingModel::Load(const TensorFile& file) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(
         layer.bias, ReadAll(file, Cat("layer", k, ".bias"), std::array{weight->shape[0], weight->shape[1]}));
   }
-  if (before != kOpinionValues) {
-    return Error{ErrorCode::kBadFile, Cat(file.name(), ": says ", before, " values of a splat, not ", kOpinionValues)};
+  if (before != kPredictionValues) {
+    return Error{ErrorCode::kBadFile,
+                 Cat(file.name(), ": says ", before, " values of a splat, not ", kPredictionValues)};
   }
   return model;
 }
@@ -128,7 +130,7 @@ const ReadingModel& ReadingModel::Shipped() {
   static const ReadingModel model = [] {
     Buffer<std::byte> bytes(anchorsplat_reading_model, anchorsplat_reading_model_end);
     const auto file = TensorFile::FromBytes(std::move(bytes), "models/reading.safetensors");
-    return *Load(*file);  // a test loads it
+    return *Load(*file);  // a test verifies that it loads
   }();
   return model;
 }
@@ -143,15 +145,15 @@ std::vector<float> ReadingModel::Scaled(std::span<const double> features) const 
   std::vector<float> scaled(mean_.size());
   for (size_t k = 0; k < scaled.size(); ++k) {
     const float z = (static_cast<float>(features[k]) - mean_[k]) / deviation_[k];
-    scaled[k] = std::isnan(z) ? 0 : z;  // what is not known is as it is of most
+    scaled[k] = std::isnan(z) ? 0 : z;  // unknown features get the mean
   }
   return scaled;
 }
 
-std::vector<ReadingOpinion> ReadingModel::OpinionsOf(std::span<const double> features) const {
+std::vector<ReadingPrediction> ReadingModel::Predict(std::span<const double> features) const {
   std::vector<float> first = Scaled(features);
   for (float& z : first) z = std::clamp(z, -kMostDeviations, kMostDeviations);
-  std::vector<ReadingOpinion> opinions;
+  std::vector<ReadingPrediction> predictions;
   for (size_t member = 0; member < members_; ++member) {
     std::vector<float> values = first;
     for (size_t k = 0; k < layers_.size(); ++k) {
@@ -165,9 +167,9 @@ std::vector<ReadingOpinion> ReadingModel::OpinionsOf(std::span<const double> fea
       }
       values = std::move(next);
     }
-    opinions.push_back(OpinionFrom(values));
+    predictions.push_back(PredictionFrom(values));
   }
-  return opinions;
+  return predictions;
 }
 
 double ReadingModel::Strangeness(std::span<const double> features) const {

@@ -13,54 +13,55 @@
 
 namespace anchorsplat {
 
-// How a splat was made, or what has become of it: what a reading tells apart.
-enum class Made { kClassic, kAntialiased, kMip, kFiltered, kEnhanced, kRaised, kMesh, kGenerated };
-inline constexpr size_t kMadeCount = 8;
-std::string_view NameOf(Made made);   // "classic", "antialiased", …, as in the table of readings
-std::string_view InWords(Made made);  // "an antialiased splat"
-// Whether it has its width: of Mip-Splatting, filtered or enhanced before, made of a mesh.
-bool HasItsWidth(Made made);
+// How a splat was made, or last processed.
+enum class Provenance { kClassic, kAntialiased, kMip, kFiltered, kEnhanced, kRaised, kMesh, kGenerated };
+inline constexpr size_t kProvenanceCount = 8;
+std::string_view NameOf(Provenance made);    // "classic", "antialiased", …, as in the table of readings
+std::string_view Describe(Provenance made);  // "an antialiased splat"
+// Whether splats of this provenance have their full width: fitted by Mip-Splatting, already filtered or enhanced, or
+// made from a mesh.
+bool HasFullWidth(Provenance made);
 
-// What gains are known of: in each render mode with the filter, then with a network.
+// Predicted gains: per render mode with the filter, then with a network.
 inline constexpr size_t kGainCount = 6;
 constexpr size_t GainOf(RenderMode mode, bool network) { return 2 * static_cast<size_t>(mode) + (network ? 1 : 0); }
-// Of pixels that are taken, in multiples of the true one.
+// Assumed pixel sizes at which gains are predicted, in multiples of the true one.
 inline constexpr std::array<double, 7> kGainMultiples = {0.25, 0.35, 0.5, 0.7, 1, 1.4, 2};
 
-// What one member of the ensemble says of a splat.
-struct ReadingOpinion {
-  double log_pixel = 0;                     // ln(training pixel / unit)
-  double log_spread = 0;                    // ln of its mean absolute error
-  std::array<double, kMadeCount> logits{};  // of Made
-  // Squashed, SquashGain(dB); and ln of their deviation.
+// Prediction of one member of the ensemble.
+struct ReadingPrediction {
+  double log_pixel = 0;                           // ln(training pixel / unit)
+  double log_spread = 0;                          // ln of the mean absolute error of log_pixel
+  std::array<double, kProvenanceCount> logits{};  // of Provenance
+  // SquashGain(gain in dB), and ln of its standard deviation.
   std::array<std::array<double, kGainMultiples.size()>, kGainCount> gains{}, log_deviations{};
 };
 
-// Gains beyond a few dB count by their logarithm.
+// Compresses gains: logarithmic beyond a few dB.
 double SquashGain(double decibels);
 
-// Perceptrons of two hidden layers (SiLU) that have learned from the table of readings, all of the same features
+// Ensemble of perceptrons with two hidden layers (SiLU) on the same features, trained on the table of readings
 // (scripts/train-reading.py).
 class ReadingModel {
  public:
-  // Errors (kBadFile): tensors that are missing or of another shape, other features than FeatureNames().
+  // Errors (kBadFile): missing tensors or wrong shapes; features other than FeatureNames().
   static Result<ReadingModel> Load(const TensorFile& file);
-  // The one that is part of the program.
+  // The model built into the program.
   static const ReadingModel& Shipped();
-  static std::string ShippedIdentity();  // other weights, another text
+  static std::string ShippedIdentity();  // differs when the weights differ
 
   // `features`: SplatFeatures::values.
-  std::vector<ReadingOpinion> OpinionsOf(std::span<const double> features) const;
+  std::vector<ReadingPrediction> Predict(std::span<const double> features) const;
 
-  // How far the splat lies from those that were learned from: root mean square of the features' deviations, over what
-  // 98 % of splats that were not learned from stay below.
+  // Distance of a splat from the training set: RMS of the features' deviations, over the 98 % quantile for held-out
+  // splats.
   double Strangeness(std::span<const double> features) const;
 
-  // By which the mean absolute error is multiplied so that an interval of that much on either side holds 80 % of the
-  // pixels of splats that were not learned from.
+  // Factor from mean absolute error to the half-width of an interval that holds the true pixel for 80 % of held-out
+  // splats.
   double interval() const { return interval_; }
 
-  // Standard deviation of ln of what is said of the pixels of places of one splat, less the true ones, around its mean.
+  // Standard deviation, within one splat, of ln(predicted / true pixel) of places around its mean.
   double place_error() const { return place_error_; }
 
  private:

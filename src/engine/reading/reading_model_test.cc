@@ -92,14 +92,14 @@ TEST_F(ReadingModelTest, SaysWhatThePlainReferenceSays) {
   std::vector<double> features(FeatureNames().size());
   for (double& x : features) x = 3 * random.Normal();
   features[5] = std::nan("");
-  const auto opinions = model->OpinionsOf(features);
-  ASSERT_EQ(opinions.size(), static_cast<size_t>(kMembers));
-  for (size_t member = 0; member < opinions.size(); ++member) {
+  const auto predictions = model->Predict(features);
+  ASSERT_EQ(predictions.size(), static_cast<size_t>(kMembers));
+  for (size_t member = 0; member < predictions.size(); ++member) {
     const std::vector<double> expected = PlainReference(weights, member, features);
-    const ReadingOpinion& said = opinions[member];
+    const ReadingPrediction& said = predictions[member];
     EXPECT_NEAR(said.log_pixel, expected[0], 1e-4);
     EXPECT_NEAR(said.log_spread, std::clamp(expected[1], -3.5, 1.0), 1e-4);
-    for (size_t k = 0; k < kMadeCount; ++k) EXPECT_NEAR(said.logits[k], expected[2 + k], 1e-4);
+    for (size_t k = 0; k < kProvenanceCount; ++k) EXPECT_NEAR(said.logits[k], expected[2 + k], 1e-4);
     for (size_t t = 0; t < kGainCount; ++t) {
       for (size_t k = 0; k < 7; ++k) {
         EXPECT_NEAR(said.gains[t][k], expected[10 + 7 * t + k], 1e-4);

@@ -27,12 +27,12 @@ TEST(Reading, OfFitsIsNearTheTruth) {
     ASSERT_TRUE(reading.ok()) << reading.error().message;
     EXPECT_GT(reading->pixel, 0.75 * kTrue) << name;
     EXPECT_LT(reading->pixel, 1.25 * kTrue) << name;
-    EXPECT_EQ(reading->likeliest(), Made::kClassic) << name;
+    EXPECT_EQ(reading->likeliest(), Provenance::kClassic) << name;
     EXPECT_LT(reading->low, reading->pixel);
     EXPECT_GT(reading->high, reading->pixel);
     EXPECT_LT(reading->strangeness, 1) << name;
     double sum = 0;
-    for (const double probability : reading->made) sum += probability;
+    for (const double probability : reading->provenance) sum += probability;
     EXPECT_NEAR(sum, 1, 1e-6);
     EXPECT_EQ(Treat(*reading, {}).method, TreatmentMethod::kNetwork) << name;
   }
@@ -117,17 +117,19 @@ TEST(Reading, IsNotMovedByGiantsAndSkies) {
 
 TEST(Reading, AccusesOnlyWithCertainty) {
   Reading reading;
-  const auto set = [&](Made made, double probability) { reading.made[static_cast<size_t>(made)] = probability; };
-  set(Made::kEnhanced, 0.6);
-  set(Made::kClassic, 0.3);
-  set(Made::kGenerated, 0.1);
-  EXPECT_EQ(reading.likeliest(), Made::kClassic);
+  const auto set = [&](Provenance made, double probability) {
+    reading.provenance[static_cast<size_t>(made)] = probability;
+  };
+  set(Provenance::kEnhanced, 0.6);
+  set(Provenance::kClassic, 0.3);
+  set(Provenance::kGenerated, 0.1);
+  EXPECT_EQ(reading.likeliest(), Provenance::kClassic);
   // Several that have their width are as good as one.
-  set(Made::kEnhanced, 0.5);
-  set(Made::kMip, 0.45);
-  set(Made::kClassic, 0.05);
-  set(Made::kGenerated, 0);
-  EXPECT_EQ(reading.likeliest(), Made::kEnhanced);
+  set(Provenance::kEnhanced, 0.5);
+  set(Provenance::kMip, 0.45);
+  set(Provenance::kClassic, 0.05);
+  set(Provenance::kGenerated, 0);
+  EXPECT_EQ(reading.likeliest(), Provenance::kEnhanced);
 }
 
 TEST(Reading, NeedsSomethingThatShows) {

@@ -9,7 +9,7 @@
 #include "core/splat_comments.h"
 #include "core/text.h"
 #include "formats/registry.h"
-#include "reading/showing_gaussians.h"
+#include "reading/visible_gaussians.h"
 
 namespace anchorsplat {
 
@@ -43,8 +43,8 @@ std::vector<std::string> Problems(const CloudStatistics& s) {
   return out;
 }
 
-// Goes through the Gaussians twice. `whole`: all of them with their harmonics, or none where that is too much to keep.
-// Errors: of reading.
+// Inspects a splat in two passes. `whole`: all Gaussians with SH, or an empty view if that is too much to keep.
+// Errors: those of reading.
 Status Inspect(CloudBlocks& blocks, const std::function<CloudView()>& whole, SplatFindings& findings) {
   findings.render_mode = blocks.render_mode();
   findings.comments = blocks.comments();
@@ -52,22 +52,22 @@ Status Inspect(CloudBlocks& blocks, const std::function<CloudView()>& whole, Spl
   CloudView said;  // all but the Gaussians
   said.render_mode = findings.render_mode;
   said.comments = findings.comments;
-  findings.lost_no_width = HasLostNoWidth(said);
+  findings.lost_no_width = IsMarkedFullWidth(said);
 
   StatisticsStudy statistics(blocks);
-  ShowingStudy study(blocks);
+  VisibleGaussiansStudy study(blocks);
   RowStudy* const studies[] = {&statistics, &study};
   ANCHORSPLAT_RETURN_IF_ERROR(Study(blocks, studies));
   findings.statistics = statistics.Find();
-  ShowingGaussians showing = study.Take();
-  // Without them, what shows is read as if it had no harmonics.
+  VisibleGaussians visible = study.Take();
+  // Otherwise the visible Gaussians are read as if they had no SH.
   CloudView all = whole();
   if (all.size() != blocks.size()) {
-    all = showing.all;
-    for (size_t i = 0; i < showing.rows_of_all.size(); ++i) showing.rows_of_all[i] = static_cast<int64_t>(i);
+    all = visible.cloud;
+    for (size_t i = 0; i < visible.rows.size(); ++i) visible.rows[i] = static_cast<int64_t>(i);
   }
   all.render_mode = findings.render_mode;
-  findings.reading = Read(all, showing);
+  findings.reading = Read(all, visible);
   if (findings.reading.ok() && !findings.lost_no_width) {
     findings.treatment = Treat(*findings.reading, {.mode = findings.render_mode});
   }

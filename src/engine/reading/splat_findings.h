@@ -12,7 +12,7 @@
 #include "reading/treatment.h"
 
 namespace anchorsplat {
-
+// What a splat is and what may be wrong with it, as shown by `info`.
 // What a splat is and what is wrong with it: what `info` tells.
 struct SplatFindings {
   std::string file;    // empty: a splat in memory
@@ -22,18 +22,18 @@ struct SplatFindings {
   std::optional<RenderMode> render_mode;  // as the file says
   std::vector<std::string> comments;
   WorldOrigin origin = {0, 0, 0};  // of the means
-  bool lost_no_width = false;      // HasLostNoWidth (core/splat_comments.h)
+  bool lost_no_width = false;      // IsMarkedFullWidth (core/splat_comments.h)
   CloudStatistics statistics;
-  Result<Reading> reading = Error{};  // of what shows
-  Treatment treatment;                // what `enhance` would do by itself, at kInfoUpscale
+  Result<Reading> reading = Error{};  // of the visible Gaussians
+  Treatment treatment;                // what `enhance` would do by default, at kInfoUpscale
   std::vector<std::string> problems;  // sentences
 };
 
 inline constexpr double kInfoUpscale = 4;  // the default zoom of `enhance`
 
-// What it looks like and what `enhance` would do about it: "a classic splat (98 %)"; "a network at pixels of 0.01, for
-// 3.1 dB at 4x".
-std::string LooksInWords(const SplatFindings& findings);
+// The splat's provenance, "a classic splat (98 %)", and what `enhance` would do, "a network at pixels of 0.01, for 3.1
+// dB at 4x".
+std::string DescribeProvenance(const SplatFindings& findings);
 std::string TreatmentInWords(const SplatFindings& findings);
 
 // `name` is the file's, for people. The same numbers with any number of threads, whatever of the file is in memory.

@@ -25,13 +25,15 @@ namespace anchorsplat {
 namespace {
 
 constexpr int kViews = 4;
-constexpr int kSide = 256;             // px: enough of the outline, and quick
+constexpr int kSide = 256;             // px: enough outline, and fast
 constexpr double kDetailPixel = 0.25;  // of the unit
 constexpr double kFieldOfView = std::numbers::pi / 4;
-constexpr double kNearPlane = 0.01;  // of the distance; everything lies behind
-constexpr double kSamples = 2;       // pixels per size that is tried
-// Times the median footprint: a ground, walls, clutter around an object that no picture shows. Fits of objects seen
-// from all around have at most 0.02 of their outlines of such Gaussians; from five on, photographs have many.
+constexpr double kNearPlane = 0.01;  // relative to the distance; everything is behind it
+constexpr double kSamples = 2;       // rendered pixels per pixel size tried
+// Gaussians with this many times the median footprint are coarse: a ground, walls or clutter that no picture shows
+// well.
+// In fits of objects seen from all around they form at most 0.02 of the outlines; in photographs, at five and above,
+// many.
 constexpr float kCoarse = 6;
 
 // ln √(largest × middle axis).
@@ -42,43 +44,43 @@ float LogFootprint(const GaussianCloud& cloud, int64_t i) {
   return 0.5f * (axes[1] + axes[2]);
 }
 
-// LogFootprint from which on a Gaussian is coarse among the others.
+// LogFootprint from which a Gaussian is coarse.
 float LogCoarse(const GaussianCloud& cloud) {
-  Buffer<float> showing;
+  Buffer<float> visible;
   for (int64_t i = 0; i < cloud.size(); ++i) {
-    if (Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]) < kShowingOpacity) continue;
-    if (const float footprint = LogFootprint(cloud, i); std::isfinite(footprint)) showing.push_back(footprint);
+    if (Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]) < kVisibleOpacity) continue;
+    if (const float footprint = LogFootprint(cloud, i); std::isfinite(footprint)) visible.push_back(footprint);
   }
-  return showing.empty() ? std::numeric_limits<float>::infinity() : Quantile(showing, 0.5) + std::log(kCoarse);
+  return visible.empty() ? std::numeric_limits<float>::infinity() : Quantile(visible, 0.5) + std::log(kCoarse);
 }
 
-// Whether it reaches beyond what was looked at.
-bool IsCut(const TellingGaussians& telling, int64_t i) {
-  if (!telling.reach) return false;
+// Whether Gaussian i extends beyond the region looked at.
+bool IsCut(const CentralGaussians& central, int64_t i) {
+  if (!central.reach) return false;
   double squares = 0;
   for (size_t a = 0; a < 3; ++a) {
-    const double d = telling.cloud.means[static_cast<size_t>(3 * i) + a] - telling.framing.target[a];
+    const double d = central.cloud.means[static_cast<size_t>(3 * i) + a] - central.framing.target[a];
     squares += d * d;
   }
-  const float* const scales = telling.cloud.log_scales.data() + 3 * i;
-  return std::sqrt(squares) + 3 * std::exp(double{std::max({scales[0], scales[1], scales[2]})}) > *telling.reach;
+  const float* const scales = central.cloud.log_scales.data() + 3 * i;
+  return std::sqrt(squares) + 3 * std::exp(double{std::max({scales[0], scales[1], scales[2]})}) > *central.reach;
 }
 
 class Painter {
  public:
-  explicit Painter(const TellingGaussians& telling) : cloud_(telling.cloud), colors_(telling.cloud.sh) {
+  explicit Painter(const CentralGaussians& central) : cloud_(central.cloud), colors_(central.cloud.sh) {
     const Pinhole intrinsics = PinholeFromFov(kSide, kSide, kFieldOfView);
-    distance_ = FramingDistance({telling.framing.target, telling.radius()}, intrinsics);
+    distance_ = FramingDistance({central.framing.target, central.radius()}, intrinsics);
     farthest_pixel_ = distance_ / intrinsics.fx;
-    marked_ = Mark(telling);
+    marked_ = Mark(central);
     still_.emplace(cloud_);
-    options_.near_plane = static_cast<float>(kNearPlane * distance_);  // scales with the cloud, as all does
+    options_.near_plane = static_cast<float>(kNearPlane * distance_);  // scales with the cloud, like everything
     options_.far_plane = static_cast<float>(distance_ / kNearPlane);
   }
 
-  Status Prepare(const TellingGaussians& telling) {
+  Status Prepare(const CentralGaussians& central) {
     const Pinhole intrinsics = PinholeFromFov(kSide, kSide, kFieldOfView);
-    ANCHORSPLAT_ASSIGN_OR_RETURN(cameras_, OrbitCameras(kViews, distance_, telling.framing.target, intrinsics));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(cameras_, OrbitCameras(kViews, distance_, central.framing.target, intrinsics));
     return {};
   }
 
@@ -100,7 +102,7 @@ class Painter {
     return {};
   }
 
-  // Mean squares of details; the last ones are of all.
+  // Mean squares of details per level, then of all details.
   Status Details(double unit, std::array<double, SplatPictures::kDetails + 1>& of_luminance,
                  std::array<double, SplatPictures::kDetails + 1>& of_alpha) {
     still_.reset();
@@ -121,7 +123,7 @@ class Painter {
   }
 
  private:
-  // By all cameras.
+  // Renders from all cameras.
   Status Draw(double pixel, const std::function<void(const RenderOutput&)>& look) {
     std::vector<Camera> cameras = cameras_.cameras;
     for (Camera& camera : cameras) {
@@ -140,14 +142,14 @@ class Painter {
     });
   }
 
-  // Instead of green: whether it was cut; instead of blue: whether it is coarse.
-  bool Mark(const TellingGaussians& telling) {
+  // Recolours: green marks cut Gaussians, blue coarse ones.
+  bool Mark(const CentralGaussians& central) {
     const float coarse = LogCoarse(cloud_);
     std::atomic<bool> any = false;
     ParallelFor(0, cloud_.size(), 4096, [&](int64_t first, int64_t last) {
       bool found = false;
       for (int64_t i = first; i < last; ++i) {
-        const bool is_cut = IsCut(telling, i);
+        const bool is_cut = IsCut(central, i);
         const bool is_coarse = !is_cut && LogFootprint(cloud_, i) > coarse;
         float* const sh = cloud_.sh.data() + 3 * i;
         sh[0] = 0;
@@ -160,7 +162,7 @@ class Painter {
     return any;
   }
 
-  // Haar details, level by level, of a picture of kSide².
+  // Adds a picture's (kSide²) squared Haar details per level.
   static void AddDetails(Buffer<float> values, std::array<double, SplatPictures::kDetails + 1>& sums) {
     int side = kSide;
     const double share = 1.0 / (static_cast<double>(kSide) * kSide * kViews);
@@ -184,11 +186,11 @@ class Painter {
   }
 
   GaussianCloud cloud_;
-  std::optional<ConstantCloud> still_;  // as `cloud_` is
+  std::optional<ConstantCloud> still_;  // of `cloud_` as it is now
   Buffer<float> colors_;
   CameraSet cameras_;
   double distance_ = 0;
-  double farthest_pixel_ = 0;  // world size of a picture's pixel where the whole cloud is in it
+  double farthest_pixel_ = 0;  // world size of a pixel when the whole cloud is in the picture
   bool marked_ = false;
   RenderOptions options_;
   Rasterizer rasterizer_;
@@ -207,18 +209,18 @@ SplatPictures UnknownPictures() {
   return pictures;
 }
 
-Result<SplatPictures> LookAt(const TellingGaussians& telling, double unit) {
-  Painter painter(telling);
-  ANCHORSPLAT_RETURN_IF_ERROR(painter.Prepare(telling));
+Result<SplatPictures> MeasurePictures(const CentralGaussians& central, double unit) {
+  Painter painter(central);
+  ANCHORSPLAT_RETURN_IF_ERROR(painter.Prepare(central));
   SplatPictures pictures;
   for (size_t k = 0; k < SplatPictures::kSizes; ++k) {
     const double size = unit * std::exp2(static_cast<double>(k) - SplatPictures::kOctaves);
     SplatPictures::AtSize& at = pictures.sizes[k];
     ANCHORSPLAT_RETURN_IF_ERROR(painter.Outlines(size, RenderMode::kClassic, at.classic, &at.cut, &at.coarse));
-    if (k % 2 == 0) continue;  // what the other rasterizer makes of them hardly changes from octave to octave
+    if (k % 2 == 0) continue;  // antialiased values hardly change from one octave to the next
     ANCHORSPLAT_RETURN_IF_ERROR(painter.Outlines(size, RenderMode::kAntialiased, at.antialiased, nullptr, nullptr));
   }
-  constexpr double kNothing = 1e-7;  // so that logarithms are finite
+  constexpr double kNothing = 1e-7;  // keeps logarithms finite
   std::array<double, SplatPictures::kDetails + 1> luminance{}, alpha{};
   ANCHORSPLAT_RETURN_IF_ERROR(painter.Details(unit, luminance, alpha));
   for (size_t k = 0; k < SplatPictures::kDetails; ++k) {

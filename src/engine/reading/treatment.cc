@@ -10,31 +10,31 @@ namespace anchorsplat {
 
 namespace {
 
-// Pixels that are tried, ln of the unit: a quarter octave apart, four octaves to either side.
+// Number of pixel sizes tried to either side of the unit: a quarter octave apart, four octaves each.
 constexpr int kTried = 16;
 constexpr double kTriedStep = 0.25;
-// A Laplace distribution in five parts of a fifth each: their middles, in mean absolute errors.
+// A Laplace distribution as five equal parts: their medians, in mean absolute errors.
 constexpr std::array<double, 5> kParts = {-1.609, -0.511, 0, 0.511, 1.609};
 
 double UnsquashGain(double squashed) { return 2 * std::sinh(squashed / 2); }
 
-constexpr double kLeast = 1e-6;  // deviations are above it
+constexpr double kLeast = 1e-6;  // lower bound of deviations
 
 struct Curve {
   double gain, deviation;
 };
 
-// At a multiple of the true pixel, its ln given. Below those measured gains go to nothing with its square, beyond them
-// they go on falling.
-Curve At(const ReadingOpinion& opinion, size_t treatment, double log_multiple) {
+// Predicted gain at a multiple of the true pixel (given as ln). Below the measured multiples it falls to zero with the
+// square, above them it falls on linearly.
+Curve At(const ReadingPrediction& prediction, size_t treatment, double log_multiple) {
   constexpr size_t kLast = kGainMultiples.size() - 1;
   static const std::array<double, kLast + 1> multiples = [] {
     std::array<double, kLast + 1> out;
     std::ranges::transform(kGainMultiples, out.begin(), [](double multiple) { return std::log(multiple); });
     return out;
   }();
-  const auto& gains = opinion.gains[treatment];
-  const auto& deviations = opinion.log_deviations[treatment];
+  const auto& gains = prediction.gains[treatment];
+  const auto& deviations = prediction.log_deviations[treatment];
   if (log_multiple < multiples[0]) {
     const double share = std::exp(2 * (log_multiple - multiples[0]));
     return {gains[0] * share, std::exp(deviations[0]) * share + kLeast};
@@ -51,25 +51,25 @@ Curve At(const ReadingOpinion& opinion, size_t treatment, double log_multiple) {
 }
 
 struct Expectation {
-  double gain = 0, loss = 0;  // means of what is squashed: of all, and of what lies below nothing
+  double gain = 0, loss = 0;  // expectations of the squashed gain, and of its negative part
 };
 
-// Of a normal distribution: the mean of what lies below zero.
+// Mean of the part below zero of a normal distribution.
 double MeanLoss(const Curve& of) {
   const double u = of.gain / of.deviation;
   const double density = std::exp(-0.5 * u * u) / std::sqrt(2 * std::numbers::pi);
   return of.deviation * density - of.gain * 0.5 * std::erfc(u / std::numbers::sqrt2);
 }
 
-// Over opinions and the pixels that each holds possible.
+// Expectation over ensemble members and the pixel sizes each considers possible.
 Expectation Expect(const Reading& reading, size_t treatment, double log_size, bool is_known) {
   Expectation sum;
-  const double weight = 1.0 / static_cast<double>(reading.opinions.size() * (is_known ? 1 : kParts.size()));
-  for (const ReadingOpinion& opinion : reading.opinions) {
+  const double weight = 1.0 / static_cast<double>(reading.predictions.size() * (is_known ? 1 : kParts.size()));
+  for (const ReadingPrediction& prediction : reading.predictions) {
     for (const double part : kParts) {
-      // Of a pixel that is known, the size is the true one.
-      const double off = is_known ? 0 : log_size - opinion.log_pixel - std::exp(opinion.log_spread) * part;
-      const Curve at = At(opinion, treatment, off);
+      // A known pixel is the true one, so the multiple is exact.
+      const double off = is_known ? 0 : log_size - prediction.log_pixel - std::exp(prediction.log_spread) * part;
+      const Curve at = At(prediction, treatment, off);
       sum.gain += weight * at.gain;
       sum.loss += weight * MeanLoss(at);
       if (is_known) break;
@@ -78,13 +78,13 @@ Expectation Expect(const Reading& reading, size_t treatment, double log_size, bo
   return sum;
 }
 
-// All pixels that are possible.
+// Tries all possible pixel sizes.
 void Try(const Reading& reading, const TreatmentRequest& request, RenderMode mode, bool network, Treatment& best,
          double& best_score) {
   for (int step = request.pixel ? kTried : -kTried; step <= kTried; ++step) {
     const double log_size = request.pixel ? std::log(*request.pixel / reading.unit) : step * kTriedStep * std::log(2.0);
     const Expectation expected = Expect(reading, GainOf(mode, network), log_size, request.pixel.has_value());
-    const double score = expected.gain - request.losses_count * expected.loss;
+    const double score = expected.gain - request.loss_weight * expected.loss;
     if (score <= best_score) continue;
     best_score = score;
     best.method = network ? TreatmentMethod::kNetwork : TreatmentMethod::kFilter;
@@ -101,18 +101,18 @@ Treatment Treat(const Reading& reading, const TreatmentRequest& request) {
   best.mode = request.mode.value_or(RenderMode::kClassic);
   double best_score = -std::numeric_limits<double>::infinity();
   for (const RenderMode mode : kRenderModes) {
-    // Without a tag those of Mip-Splatting are drawn as classic ones, whatever is known.
+    // Without a tag, Mip-Splatting splats are rendered as classic, whatever is known.
     if (request.mode ? mode != *request.mode : mode == RenderMode::kMip) continue;
     for (const bool network : {false, true}) {
       if (network ? !request.network : !request.filter) continue;
       Try(reading, request, mode, network, best, best_score);
     }
   }
-  // Who knows the pixel takes less of a risk.
+  // A known pixel lowers the risk.
   if (request.pixel ? best.gain > 0 : best_score > 0) return best;
-  if (!request.mode_is_said) {
+  if (!request.mode_is_given) {
     best.method = TreatmentMethod::kNone;
-  } else if (!request.pixel) {  // the caller is believed: it has lost the width that such splats have lost
+  } else if (!request.pixel) {  // a given pixel is believed: such splats have lost that width
     best.method = request.network ? TreatmentMethod::kNetwork : TreatmentMethod::kFilter;
     best.pixel = reading.low;
     best.gain = 0;

@@ -7,13 +7,13 @@
 
 namespace anchorsplat {
 
-// What is known besides the splat, and what may be done.
+// What is known besides the splat, and which methods are allowed.
 struct TreatmentRequest {
-  std::optional<RenderMode> mode = {};  // of its training: the file's tag, or the caller's
-  bool mode_is_said = false;            // by the caller, who wants it enhanced as such whatever it looks like
-  std::optional<double> pixel = {};     // training pixel, world units, where that is known
-  bool filter = true, network = true;   // which may be chosen
-  double losses_count = kLossesCount;   // others are for measuring what that does
+  std::optional<RenderMode> mode = {};  // render mode in training, from the file's tag or the caller
+  bool mode_is_given = false;           // given by the caller: use it whatever the reading says
+  std::optional<double> pixel = {};     // training pixel if known, world units
+  bool filter = true, network = true;   // allowed methods
+  double loss_weight = kLossWeight;     // other values serve measurements
 };
 
 enum class TreatmentMethod { kNone, kFilter, kNetwork };
@@ -21,13 +21,13 @@ enum class TreatmentMethod { kNone, kFilter, kNetwork };
 // What to do with a splat.
 struct Treatment {
   TreatmentMethod method = TreatmentMethod::kNone;
-  RenderMode mode = RenderMode::kClassic;  // to be drawn as, and to be enhanced as
-  double pixel = 0;                        // world units, to be taken for that of the training
-  double gain = 0;                         // dB that are expected of it; 0: nobody knows
+  RenderMode mode = RenderMode::kClassic;  // for rendering and enhancement
+  double pixel = 0;                        // training pixel to assume, world units
+  double gain = 0;                         // expected gain, dB; 0: unknown
 };
 
-// The one policy: of all pixels, methods and modes that are possible the one with the greatest expected gain, where
-// what is lost counts several times; nothing where that is below nothing.
+// The only policy: picks the pixel size, method and mode with the greatest expected gain, with losses weighted by
+// loss_weight. Picks kNone if that is negative.
 Treatment Treat(const Reading& reading, const TreatmentRequest& request);
 
 }  // namespace anchorsplat

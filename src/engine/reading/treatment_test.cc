@@ -10,22 +10,22 @@ namespace {
 // A splat of unit 1 whose pixel is `pixel`, within about a factor of e^spread, and of which treatments gain what
 // `curve` says of multiples, in dB and surely.
 Reading ReadingOf(double pixel, double spread, const std::array<double, 7>& network,
-                  const std::array<double, 7>& filter, Made made = Made::kClassic) {
+                  const std::array<double, 7>& filter, Provenance made = Provenance::kClassic) {
   Reading reading;
   reading.unit = 1;
   const double interval = std::log(5.0);  // of a Laplace distribution, 80 %
   reading.pixel = pixel;
   reading.low = pixel * std::exp(-interval * spread);
   reading.high = pixel * std::exp(interval * spread);
-  reading.made[static_cast<size_t>(made)] = 1;
-  ReadingOpinion& opinion = reading.opinions.emplace_back();
-  opinion.log_pixel = std::log(pixel);
-  opinion.log_spread = std::log(spread);
+  reading.provenance[static_cast<size_t>(made)] = 1;
+  ReadingPrediction& prediction = reading.predictions.emplace_back();
+  prediction.log_pixel = std::log(pixel);
+  prediction.log_spread = std::log(spread);
   for (size_t k = 0; k < 7; ++k) {
     for (size_t t = 0; t < kGainCount; ++t) {
       const double of_antialiased = t < 2 ? 0 : -1;  // it is a classic one
-      opinion.gains[t][k] = SquashGain((t % 2 == 1 ? network : filter)[k]) + of_antialiased;
-      opinion.log_deviations[t][k] = -3;
+      prediction.gains[t][k] = SquashGain((t % 2 == 1 ? network : filter)[k]) + of_antialiased;
+      prediction.log_deviations[t][k] = -3;
     }
   }
   return reading;
@@ -57,21 +57,21 @@ TEST(Treatment, ScalesWithTheUnit) {
 }
 
 TEST(Treatment, LeavesAloneWhatItWouldHarm) {
-  EXPECT_EQ(Treat(ReadingOf(2, 0.1, kHarm, kHarm, Made::kEnhanced), {}).method, TreatmentMethod::kNone);
+  EXPECT_EQ(Treat(ReadingOf(2, 0.1, kHarm, kHarm, Provenance::kEnhanced), {}).method, TreatmentMethod::kNone);
   // Also where the pixel is known.
-  EXPECT_EQ(Treat(ReadingOf(2, 0.1, kHarm, kHarm, Made::kEnhanced), {.pixel = 2}).method, TreatmentMethod::kNone);
+  EXPECT_EQ(Treat(ReadingOf(2, 0.1, kHarm, kHarm, Provenance::kEnhanced), {.pixel = 2}).method, TreatmentMethod::kNone);
 }
 
 TEST(Treatment, LeavesAloneWhatMayBeHarmedAsMuchAsHelped) {
   Reading reading = ReadingOf(2, 0.1, kNetwork, kFilter);
-  reading.opinions.push_back(ReadingOf(2, 0.1, kHarm, kHarm).opinions[0]);
-  reading.opinions.push_back(ReadingOf(2, 0.1, kHarm, kHarm).opinions[0]);
+  reading.predictions.push_back(ReadingOf(2, 0.1, kHarm, kHarm).predictions[0]);
+  reading.predictions.push_back(ReadingOf(2, 0.1, kHarm, kHarm).predictions[0]);
   EXPECT_EQ(Treat(reading, {}).method, TreatmentMethod::kNone);
 }
 
 TEST(Treatment, EnhancesAsTheCallerSays) {
-  const Reading enhanced = ReadingOf(2, 0.1, kHarm, kHarm, Made::kEnhanced);
-  const Treatment treatment = Treat(enhanced, {.mode = RenderMode::kClassic, .mode_is_said = true});
+  const Reading enhanced = ReadingOf(2, 0.1, kHarm, kHarm, Provenance::kEnhanced);
+  const Treatment treatment = Treat(enhanced, {.mode = RenderMode::kClassic, .mode_is_given = true});
   EXPECT_EQ(treatment.method, TreatmentMethod::kNetwork);
   EXPECT_GT(treatment.pixel, 1);
   EXPECT_LT(treatment.pixel, 2);  // to be safe
@@ -80,9 +80,9 @@ TEST(Treatment, EnhancesAsTheCallerSays) {
 
 // What the reading expects nothing of is not answered with a pixel of nothing, whatever it is taken for.
 TEST(Treatment, EnhancesAsTheCallerSaysWhatLooksLikeAnything) {
-  for (const Made made : {Made::kGenerated, Made::kMesh, Made::kClassic}) {
+  for (const Provenance made : {Provenance::kGenerated, Provenance::kMesh, Provenance::kClassic}) {
     const Reading reading = ReadingOf(2, 0.1, kHarm, kHarm, made);
-    const Treatment treatment = Treat(reading, {.mode = RenderMode::kClassic, .mode_is_said = true, .network = false});
+    const Treatment treatment = Treat(reading, {.mode = RenderMode::kClassic, .mode_is_given = true, .network = false});
     EXPECT_EQ(treatment.method, TreatmentMethod::kFilter);
     EXPECT_DOUBLE_EQ(treatment.pixel, reading.low);
     EXPECT_EQ(treatment.gain, 0);

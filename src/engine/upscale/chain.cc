@@ -10,17 +10,17 @@ namespace anchorsplat {
 
 namespace {
 
-// Convolutions one behind the other; what is negative is multiplied with its channel's slope, but for the last.
+// A chain of convolutions, each but the last followed by its channels' slopes for negative values.
 class Chain : public UpscaleArchitecture {
  public:
   struct Layer {
     PackedWeights weights;
-    Buffer<float> slopes;  // [outputs], none of the last
+    Buffer<float> slopes;  // [outputs]; empty for the last
   };
   std::vector<Layer> layers;
 
   int radius() const override { return static_cast<int>(layers.size()); }
-  // The networks of waifu2x have no padding: what they hear of is cut off. Beyond that nothing of a map's end is heard.
+  // waifu2x networks have no padding: they crop by their receptive field, so padding at map borders has no effect.
   int continued() const override { return radius(); }
   int64_t floats_per_pixel() const override {
     int64_t widest[2] = {0, 0};
@@ -52,7 +52,7 @@ class Chain : public UpscaleArchitecture {
   }
 };
 
-// conv.0 to conv.{count − 1}, of which the first sees `inputs` channels.
+// Reads conv.0 to conv.{count − 1}; the first has `inputs` inputs.
 Result<std::vector<ConvolutionValues>> ReadChain(const TensorFile& file, int count, int64_t inputs,
                                                  std::vector<Buffer<float>>& slopes) {
   std::vector<ConvolutionValues> out;
@@ -66,7 +66,7 @@ Result<std::vector<ConvolutionValues>> ReadChain(const TensorFile& file, int cou
   return out;
 }
 
-// Maps of the same value everywhere behind the three colours, as part of the bias.
+// Folds constant input maps (after the three colours) into the bias.
 void FoldConstants(const Buffer<float>& constants, ConvolutionValues& values) {
   const auto count = static_cast<int64_t>(constants.size());
   Buffer<float> of_colors(static_cast<size_t>(values.outputs * 3 * 9));

@@ -19,7 +19,7 @@ HWY_BEFORE_NAMESPACE();
 namespace anchorsplat {
 namespace HWY_NAMESPACE {
 
-// 1/(1 + e^−x); 0 and 1 far out.
+// 1/(1 + e^−x); saturates to 0 and 1.
 template <class D, class V = hn::VFromD<D>>
 HWY_INLINE V Sigmoid(D d, V x) {
   const V one = hn::Set(d, 1.0f);
@@ -27,7 +27,7 @@ HWY_INLINE V Sigmoid(D d, V x) {
   return hn::Div(one, hn::Add(one, Exp2(d, exponent)));
 }
 
-// What becomes of `count` sums from a channel on; `gated` and `slopes` begin there, too.
+// Activates `count` sums; `gated` and `slopes` start at the same channel.
 template <class D, class V = hn::VFromD<D>>
 HWY_INLINE V Activated(D d, MapActivation activation, V x, const float* slopes, const float* gated) {
   switch (activation) {
@@ -43,7 +43,7 @@ HWY_INLINE V Activated(D d, MapActivation activation, V x, const float* slopes, 
   return x;
 }
 
-// On sums that were just written and are still in the first cache.
+// Activates sums that are still in the L1 cache.
 void ActivateColumns(const ConvolutionParams& p, int64_t column, int64_t columns, float* out, const float* gated) {
   const TileTag d;
   const auto lanes = static_cast<int64_t>(hn::Lanes(d));
@@ -64,7 +64,7 @@ void ActivateColumns(const ConvolutionParams& p, int64_t column, int64_t columns
   std::copy(sums, sums + (columns - c), out + c);
 }
 
-// Rows [begin, end) of the picture.
+// Convolves rows [begin, end) of the picture.
 void ConvolveRows(const ConvolutionParams& p, int64_t begin, int64_t end) {
   const int64_t outputs = p.out->channels(), width = p.out->width();
   for (int64_t y = begin; y < end; ++y) {
@@ -77,7 +77,7 @@ void ConvolveRows(const ConvolutionParams& p, int64_t begin, int64_t end) {
         const float* bias = p.inputs.front().weights->bias() + column;
         for (const ConvolutionInput& input : p.inputs) {
           const PackedWeights& w = *input.weights;
-          const int64_t reach = w.taps() / 2;  // pixels beyond the middle
+          const int64_t reach = w.taps() / 2;  // pixels on each side of the centre
           for (int64_t tap = 0; tap < w.taps(); ++tap) {
             MultiplyTile(pixels, columns,
                          {.depth = w.inputs(),
@@ -88,7 +88,7 @@ void ConvolveRows(const ConvolutionParams& p, int64_t begin, int64_t end) {
                           .bias = bias,
                           .added = bias == nullptr ? out : nullptr,
                           .out = out});
-            bias = nullptr;  // the next adds to these sums
+            bias = nullptr;  // later inputs add to these sums
           }
         }
         if (p.activation == MapActivation::kNone) continue;

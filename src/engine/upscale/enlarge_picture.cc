@@ -20,7 +20,7 @@ Result<Image> EnlargeTimes(Upscaler& upscaler, Image image, int times) {
   return image;
 }
 
-// The enlarged coverage, one channel.
+// The enlarged alpha, one channel.
 Result<Image> EnlargeAlpha(Upscaler& upscaler, const Image& image, int times, const EnlargeOptions& options,
                            int factor) {
   const float* alpha = image.channel(3);

@@ -8,16 +8,15 @@
 
 namespace anchorsplat {
 
-// What a layer makes of a picture: [H+2, W+2, C] with the channels of a pixel side by side, and around the picture a
-// ring of zeros one pixel wide, so that a 3×3 convolution reads beyond the border as it was trained to: three pixels of
-// a row are 3·C floats in one piece.
+// A layer's output: [H+2, W+2, C], channels of a pixel contiguous, with a zero border one pixel wide. So a 3×3
+// convolution sees the zero padding it was trained with, and three pixels of a row are 3·C contiguous floats.
 class FeatureMap {
  public:
   int64_t width() const { return width_; }
   int64_t height() const { return height_; }
   int64_t channels() const { return channels_; }
 
-  // Takes the shape; the ring is zero, what is inside is anything. Memory is used again.
+  // Sets the shape, reusing memory; zeroes the border and leaves the inside undefined.
   void Reshape(int64_t width, int64_t height, int64_t channels) {
     width_ = width;
     height_ = height;
@@ -34,7 +33,7 @@ class FeatureMap {
     }
   }
 
-  // Channels of a pixel, −1 ≤ x ≤ W and −1 ≤ y ≤ H; those of the next in its row follow.
+  // Channels of a pixel, −1 ≤ x ≤ W and −1 ≤ y ≤ H; the next pixel of the row follows.
   float* pixel(int64_t x, int64_t y) { return values_.data() + ((y + 1) * (width_ + 2) + x + 1) * channels_; }
   const float* pixel(int64_t x, int64_t y) const {
     return values_.data() + ((y + 1) * (width_ + 2) + x + 1) * channels_;

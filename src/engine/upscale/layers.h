@@ -10,7 +10,7 @@
 
 namespace anchorsplat {
 
-// A convolution of a file: NAME.weight, NAME.bias and, where it has one, NAME.slope.
+// A convolution read from a file: NAME.weight and NAME.bias.
 struct ConvolutionValues {
   int64_t outputs = 0;
   int64_t inputs = 0;
@@ -18,17 +18,18 @@ struct ConvolutionValues {
   Buffer<float> bias;     // [outputs]
 };
 
-// The channels that NAME.weight [C, inputs, side, side] makes. Errors (kBadFile, with the path): no such tensor,
-// another rank, none or more than kMostMapChannels.
+// Output channels C of NAME.weight [C, inputs, side, side]. Errors (kBadFile, with the path): no such tensor; another
+// rank;
+// C not in 1 … kMostMapChannels.
 Result<int64_t> ReadOutputs(const TensorFile& file, const std::string& name);
 
-// Values of the tensor of exactly this shape, all of them finite. Errors (kBadFile, with the path): those.
+// Reads a tensor of exactly this shape. Errors (kBadFile, with the path): missing, another shape, non-finite values.
 Result<Buffer<float>> ReadFinite(const TensorFile& file, const std::string& name, const std::vector<int64_t>& shape);
 
 Result<ConvolutionValues> ReadConvolution(const TensorFile& file, const std::string& name, int64_t outputs,
                                           int64_t inputs, int64_t side);
 
-// Of a convolution with these weights, per pixel.
+// Multiply-adds of this convolution per pixel.
 double MultiplyAdds(const PackedWeights& weights);
 
 PackedWeights Packed(const ConvolutionValues& values, int64_t side);

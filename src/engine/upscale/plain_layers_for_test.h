@@ -11,7 +11,7 @@
 
 namespace anchorsplat {
 
-// The layers as papers write them, in double and one number after the other.
+// Layers as papers define them, in double, one number at a time.
 
 // [C,H,W], zero beyond the border.
 struct PlainMap {
@@ -27,7 +27,7 @@ struct PlainMap {
   }
 };
 
-// A tensor of a module, row-major.
+// A row-major tensor.
 struct PlainTensor {
   std::vector<int64_t> shape;
   std::vector<float> values;
@@ -41,7 +41,7 @@ inline PlainTensor RandomTensor(std::vector<int64_t> shape, double spread, Rando
   return out;
 }
 
-// PyTorch's Conv2d, stride 1, as many pixels of padding as keep the size. `weights` [out, in, side, side].
+// PyTorch's Conv2d, stride 1, with size-preserving padding. `weights` [out, in, side, side].
 inline PlainMap PlainConvolution(const PlainMap& in, const PlainTensor& weights, const PlainTensor& bias) {
   const int64_t outputs = weights.shape[0], inputs = weights.shape[1], side = weights.shape[2], reach = side / 2;
   PlainMap out(outputs, in.height, in.width);
@@ -111,7 +111,7 @@ inline PlainMap PlainConcatenation(const std::vector<const PlainMap*>& maps) {
   return out;
 }
 
-// `f` of each value, given its channel and its place among all values.
+// Applies `f` to each value, given its channel and index.
 inline PlainMap PlainApply(PlainMap map, const std::function<double(double value, int64_t channel, size_t at)>& f) {
   for (size_t i = 0; i < map.values.size(); ++i) {
     map.values[i] = f(map.values[i], static_cast<int64_t>(i) / (map.height * map.width), i);

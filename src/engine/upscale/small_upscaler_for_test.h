@@ -17,7 +17,7 @@
 
 namespace anchorsplat {
 
-// For tests: a network of random numbers, and its file.
+// A network of random numbers, and its file.
 struct SmallUpscaler {
   std::map<std::string, std::string> metadata;
   std::map<std::string, PlainTensor> tensors;
@@ -31,7 +31,7 @@ struct SmallUpscaler {
   }
 };
 
-// As a program reads it.
+// The network after a round trip through a file.
 inline Upscaler OpenedForTest(const SmallUpscaler& network) {
   const TestFolder folder;
   EXPECT_TRUE(network.Write(folder / "network.safetensors").ok());
@@ -50,7 +50,7 @@ inline SmallUpscaler UpscalerForTest(const std::string& architecture, int scale,
   return out;
 }
 
-// A convolution of `out` under this name. As large as keeps the size of what goes through.
+// Adds a convolution to `out`, scaled to preserve the magnitude of activations.
 inline void AddConvolution(SmallUpscaler& out, const std::string& name, int64_t outputs, int64_t inputs, int64_t side,
                            Random& random) {
   const double spread = 2 / std::sqrt(static_cast<double>(inputs * side * side));
@@ -71,7 +71,7 @@ inline SmallUpscaler SpanForTest(int64_t channels = 5, int scale = 3) {
   return out;
 }
 
-// conv.{0…}, each of so many channels, of which the first sees `inputs`.
+// Adds conv.{0…} with these numbers of channels; the first has `inputs` inputs.
 inline int64_t AddChain(SmallUpscaler& out, const std::vector<int64_t>& channels, int64_t inputs, Random& random) {
   for (size_t k = 0; k < channels.size(); ++k) {
     AddConvolution(out, Cat("conv.", k), channels[k], inputs, 3, random);
@@ -99,7 +99,7 @@ inline SmallUpscaler SrmdForTest() {
   return out;
 }
 
-// One that gives each pixel four times.
+// A network that repeats each pixel four times.
 inline SmallUpscaler RepeatingForTest() {
   Random random(10);
   SmallUpscaler out = UpscalerForTest("srmd-1", 2, random);

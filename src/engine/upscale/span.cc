@@ -17,9 +17,9 @@ class Span : public UpscaleArchitecture {
  public:
   PackedWeights first, second, upsampler;
   std::array<std::array<PackedWeights, 3>, kBlocks> blocks;
-  std::array<PackedWeights, 4> joined;  // conv_cat, a quarter of its inputs each
+  std::array<PackedWeights, 4> joined;  // conv_cat, split into quarters of its inputs
 
-  // conv_1, three in each block, conv_2 and the upsampler.
+  // conv_1, three per block, conv_2 and the upsampler.
   int radius() const override { return 1 + 3 * kBlocks + 2; }
   int continued() const override { return 0; }
   int64_t floats_per_pixel() const override { return 3 + 6 * first.outputs() + upsampler.outputs(); }
@@ -64,7 +64,7 @@ class Span : public UpscaleArchitecture {
   }
 };
 
-// Inputs [from, from + count) of a 1×1 convolution; the bias goes with the first of them.
+// Inputs [from, from + count) of a 1×1 convolution; only the first part has the bias.
 PackedWeights PackInputs(const ConvolutionValues& values, int64_t from, int64_t count) {
   Buffer<float> part(static_cast<size_t>(values.outputs * count));
   for (int64_t o = 0; o < values.outputs; ++o) {

@@ -17,13 +17,13 @@ namespace {
 constexpr int64_t kTileBytes = int64_t{256} << 20;
 constexpr int kLeastTile = 32;
 
-// The side of a tile whose maps, with what it hears from, take about kTileBytes.
+// Tile side for which the maps, with overlap, take about kTileBytes.
 int TileSide(const UpscaleArchitecture& architecture) {
   const double pixels = static_cast<double>(kTileBytes) / (4.0 * static_cast<double>(architecture.floats_per_pixel()));
   return std::max(kLeastTile, static_cast<int>(std::sqrt(pixels)) - 2 * architecture.radius());
 }
 
-// Where tile k of `count` equal ones of a side begins.
+// Start of tile k when a side is divided into `count` equal ones.
 int TileBegin(int side, int k, int count) { return static_cast<int>(int64_t{side} * k / count); }
 
 bool AllFinite(const Image& image) {

@@ -11,8 +11,7 @@
 
 namespace anchorsplat {
 
-// What a file says of its network, in the metadata of its safetensors. `source` and `licence` are for people and may be
-// any text.
+// Metadata of a network's safetensors file. `source` and `licence` are free text for people.
 struct UpscalerInfo {
   std::string architecture;  // with its version, "span-1"
   int scale = 0;             // 2 to 4
@@ -20,29 +19,30 @@ struct UpscalerInfo {
   std::string licence;
 };
 
-// A network that enlarges pictures: a small convolutional network that was trained on pictures. What it adds is
-// invented.
+// A small convolutional network that enlarges pictures. The detail it adds is invented.
 //
-// Colours go in as an Image has them, sRGB from 0 to 1, (colour − input.mean)·input.scale in the first layer's terms.
-// Large pictures go through in tiles, which overlap by all that a pixel hears from: the result has the same bits as in
-// one piece, and for any number of threads. With another SIMD width the last places may differ.
+// Input colours are sRGB 0–1 as in Image; the first layer gets (colour − input.mean)·input.scale. Large pictures are
+// processed in tiles that overlap by the receptive field: the bits are those of a single piece, for any number of
+// threads.
+// The last bit may differ between SIMD widths.
 class Upscaler {
  public:
-  // Errors: those of TensorFile; kBadFile with the path: no upscaler, another version of its format, an architecture,
-  // colour space or range that is not known, and what MakeArchitecture says.
+  // Errors: those of TensorFile; kBadFile with the path: no upscaler; another format version; an unknown architecture,
+  // colour space or range; those of MakeArchitecture.
   static Result<Upscaler> Read(const std::filesystem::path& path);
 
   const UpscalerInfo& info() const { return info_; }
-  double multiply_adds_per_pixel() const { return architecture_->multiply_adds_per_pixel(); }  // of the input
+  double multiply_adds_per_pixel() const { return architecture_->multiply_adds_per_pixel(); }  // per input pixel
 
-  // [3,H,W] to [3,H·scale,W·scale], not clamped. `tile`: the side of a tile in pixels of the input; 0: what takes a
-  // quarter of a gigabyte. One call at a time. Errors: kBadArgument: no colour picture, or a result that is too large;
-  // kBadFile: the network's numbers overflow.
+  // Enlarges [3,H,W] to [3,H·scale,W·scale], not clamped. `tile`: tile side in input pixels; 0: about a quarter of a
+  // gigabyte per tile. Not thread-safe. Errors: kBadArgument: not three channels, or a result that is too large;
+  // kBadFile:
+  // activations overflow.
   Result<Image> Enlarge(const Image& image, int tile = 0);
 
  private:
   Upscaler() = default;
-  // The picture's pixels of `box`, which may reach beyond it, in the first layer's terms.
+  // Loads the picture's pixels in `box`, which may reach beyond it, as the first layer's input.
   void Load(const Image& image, const PixelBox& box);
 
   UpscalerInfo info_;
@@ -54,7 +54,7 @@ class Upscaler {
   std::vector<FeatureMap> maps_;
 };
 
-// The value of "format" in the metadata.
+// Value of "format" in the metadata.
 inline constexpr const char* kUpscalerFormat = "anchorsplat-upscaler-1";
 
 }  // namespace anchorsplat

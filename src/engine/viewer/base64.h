@@ -6,7 +6,7 @@
 
 namespace anchorsplat {
 
-// RFC 4648 with padding, on one line.
+// Base64 of RFC 4648, padded, on one line.
 std::string Base64(std::span<const uint8_t> bytes);
 
 }  // namespace anchorsplat

@@ -11,8 +11,7 @@
 
 namespace anchorsplat {
 
-// For tests: a cloud back from its planes, in the order they hold, written from the table in quantized_cloud.h as the
-// page's worker.js is.
+// Decodes planes into a cloud, in their order. Written from the table in quantized_cloud.h, as the page's worker.js is.
 inline GaussianCloud Dequantize(const QuantizedCloud& q) {
   GaussianCloud cloud;
   cloud.Resize(q.count, q.sh_degree);

@@ -8,8 +8,7 @@
 
 namespace anchorsplat {
 
-// For tests: a cloud of the given size that looks like a fitted one, with all its values spread over their usual
-// ranges, which is the worst there is for a compressor.
+// A cloud that resembles a fitted one, with all values spread over their usual ranges: the worst case for compression.
 inline GaussianCloud FittedLookingCloud(int64_t n, int sh_degree, uint64_t seed) {
   Random random(seed);
   GaussianCloud cloud;

@@ -4,7 +4,7 @@
 
 namespace anchorsplat {
 
-// The text of a file of page/, as it was when the program was built; empty for a name that is not there.
+// Contents of a file of page/, embedded at build time; empty for unknown names.
 std::string_view PageFile(std::string_view name);
 
 }  // namespace anchorsplat

@@ -22,9 +22,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kStaged = "data";  // until it has its name
+constexpr const char* kStaged = "data";  // temporary name
 
-// Looking for repeated strings is of no use in planes of numbers: runs and Huffman codes alone make 1 % less of them,
+// Does not search for repeated strings, which planes of numbers lack: runs and Huffman codes alone are 1 % smaller and
 // five times faster.
 Result<std::string> DeflateBase64(std::span<const uint8_t> bytes) {
   z_stream stream{};
@@ -43,7 +43,7 @@ Result<std::string> DeflateBase64(std::span<const uint8_t> bytes) {
   return Base64(out);
 }
 
-// A name as part of a URL: whatever bytes it has, the page stays ASCII.
+// Percent-encodes a name for a URL, so that the page stays ASCII.
 std::string UrlOf(const std::string& name) {
   std::string url;
   for (const char c : name) {
@@ -71,7 +71,7 @@ bool IsPartName(std::string_view name) {
   return false;
 }
 
-// Every file in it is a part of a page.
+// Whether the folder contains only parts of a page.
 bool HoldsOnlyParts(const fs::path& folder) {
   std::error_code failed;
   for (fs::directory_iterator at(folder, failed), end; !failed && at != end; at.increment(failed)) {
@@ -80,7 +80,7 @@ bool HoldsOnlyParts(const fs::path& folder) {
   return !failed;
 }
 
-// Of what a part is decoded with and of the Gaussians themselves.
+// Identifies a splat's data: hash of its decoding parameters and Gaussians.
 std::string TokenOf(const CloudView& cloud, const QuantizedCloud& scale) {
   Fingerprint token;
   token.Add(scale.center);
@@ -93,7 +93,7 @@ std::string TokenOf(const CloudView& cloud, const QuantizedCloud& scale) {
   return token.text();
 }
 
-// The Gaussians at `rows` in the order in which they are shown.
+// Sorts rows by importance, largest first.
 void LargestFirst(const CloudView& cloud, std::vector<int64_t>& rows) {
   std::vector<char> usable(static_cast<size_t>(cloud.size()), 0);
   for (const int64_t row : rows) usable[static_cast<size_t>(row)] = 1;
@@ -157,7 +157,7 @@ Result<nlohmann::ordered_json> PageFolder::AddSplat(const CloudView& cloud, Meas
     if (StopRequested()) return Error{ErrorCode::kInterrupted, "stopped: no page was written"};
     const auto some = std::span(rows).subspan(static_cast<size_t>(begin),
                                               static_cast<size_t>(std::min(kPartGaussians, count - begin)));
-    // Within a part in the order of the cloud, as Quantize has it: Morton order does the rest.
+    // Cloud order within a part, as in Quantize; Morton order follows.
     std::ranges::sort(some);
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<std::string> texts,
                                  PackPlanes(PlanesOf(cloud, measured.scale, some)));

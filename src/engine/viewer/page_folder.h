@@ -19,33 +19,32 @@ namespace anchorsplat {
 
 struct OutputMemory;
 
-// Planes are deflated in pieces of this size, each a stream of its own, so that several threads write them.
+// Planes are deflated in independent pieces of this size, so that several threads can work.
 inline constexpr size_t kPieceBytes = size_t{1} << 22;
-// Deflated and in base64.
+// Deflates the planes and encodes each piece in base64.
 Result<std::vector<std::string>> PackPlanes(std::span<const uint8_t> planes);
 
-// Gaussians in a file of the folder: whole rows of the page's textures.
+// Gaussians per file of the folder: whole rows of the page's textures.
 inline constexpr int64_t kPartGaussians = int64_t{1} << 18;
 
-// The folder beside a page that holds its splats: after-0.js, after-1.js, …, each with kPartGaussians, the largest
-// (size × opacity) of the splat first. A page that was opened from a disk may load scripts and nothing else, so each is
-// one call:
+// The folder beside a page with its splats: after-0.js, after-1.js, …, each with kPartGaussians, largest (size ×
+// opacity) first. A page opened from disk may load only scripts, so each file is one call,
 //
 //   anchorsplatPart(TOKEN, "after-0", [PIECE, …])
 //
-// with the planes of its Gaussians in Morton order (quantized_cloud.h). The token is of the page that they belong to.
+// with the planes of its Gaussians in Morton order (quantized_cloud.h). TOKEN identifies the page.
 class PageFolder {
  public:
-  // PAGE.data beside PAGE.html, "PAGE.data-2" where that is taken. Errors: kExists when another process is writing this
-  // page; kIo.
+  // Creates PAGE.data beside PAGE.html, or "PAGE.data-2", … if that exists. Errors: kExists: another process is writing
+  // this page; kIo.
   static Result<PageFolder> Create(const std::filesystem::path& page, OutputMemory* memory);
 
-  // Writes the parts of a splat; what the page is told of them: [{id, file, count, token}], `file` relative to the page
-  // as a URL.
+  // Writes a splat's parts. Returns their descriptions for the page: [{id, file, count, token}], `file` as a URL
+  // relative to it.
   Result<nlohmann::ordered_json> AddSplat(const CloudView& cloud, MeasuredCloud measured, const std::string& id);
-  // Gives the folder its name, right before the page gets its own.
+  // Renames the folder into place. Call right before the page is.
   Status Publish();
-  // After that. `replaced`: folders of older pages of this name are removed, with nothing but parts in them.
+  // Call after that. `replaced`: removes folders of older pages of this name, if they contain only parts.
   void Keep(bool replaced);
 
  private:
@@ -53,9 +52,9 @@ class PageFolder {
   std::string FreeName() const;
 
   std::filesystem::path page_;
-  OutputMemory* memory_;  // the files go there instead
+  OutputMemory* memory_;  // if set, files go there
   std::optional<StagedFolder> staged_;
-  std::string name_;  // of the folder, which it will get
+  std::string name_;  // final name of the folder
 };
 
 }  // namespace anchorsplat

@@ -24,19 +24,19 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// A picture is for comparing by eye; anything above this is not one.
+// Larger files are not meant for comparing by eye.
 constexpr uint64_t kMaxPictureBytes = 50'000'000;
 
-// Per Gaussian: half of three means and a rotation.
+// Minimum per Gaussian: half of three means and a rotation.
 constexpr uint64_t kLeastBytes = 6;
 
-// A part of the page that its code finds by id and decodes.
+// Data in the page, found by id.
 struct DataElement {
   std::string id;
   std::string base64;
 };
 
-// An estimate that is this much too large may still be wrong.
+// Safety factor of size estimates before rejecting.
 constexpr double kSure = 0.85;
 
 Error TooLarge(const std::filesystem::path& path, uint64_t bytes, const ViewerPage& page, const char* roughly = "") {
@@ -45,12 +45,12 @@ Error TooLarge(const std::filesystem::path& path, uint64_t bytes, const ViewerPa
               HumanBytes(page.max_bytes), " a browser opens well; ", page.smaller)};
 }
 
-// Any bytes as JSON: what is not UTF-8 becomes U+FFFD, nothing ends the script element early.
+// JSON for a script element from any bytes: invalid UTF-8 becomes U+FFFD, and nothing ends the element early.
 std::string ScriptJson(const Json& json) {
   return EscapeJsonForScript(json.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
-// What the page is told of a splat, without where its data are. The page's world begins at `origin`.
+// Description of a splat for the page, without the location of its data. `origin`: that of the page's world.
 Json SplatJson(const ViewerSplat& splat, const QuantizedCloud& q, const WorldOrigin& origin) {
   const Framing framing = FrameCloud(*splat.cloud);
   std::array<double, 3> center = RelativeToOrigin(splat.cloud->origin, origin);
@@ -82,7 +82,7 @@ Json SplatJson(const ViewerSplat& splat, const QuantizedCloud& q, const WorldOri
               {"planes", PlanesPerGaussian(q.sh_degree)}};
 }
 
-// Its data go to `elements`, or to `folder` where there is one.
+// Adds a splat: its data go to `folder` if set, else to `elements`.
 Result<Json> AddSplat(const ViewerSplat& splat, const WorldOrigin& origin, const std::string& id, int max_sh_degree,
                       std::vector<DataElement>& elements, PageFolder* folder = nullptr) {
   if (splat.cloud == nullptr) return Error{ErrorCode::kBadArgument, Cat("no cloud to show as \"", id, "\"")};
@@ -106,7 +106,7 @@ Result<Json> AddSplat(const ViewerSplat& splat, const WorldOrigin& origin, const
   return json;
 }
 
-// The picture's MIME type goes by its first bytes: a browser that is told the truth does not guess.
+// Embeds a picture. Its first bytes determine the MIME type.
 Result<Json> AddPicture(const std::filesystem::path& path, const std::string& id, std::vector<DataElement>& elements) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string bytes, ReadFileBytes(path, kMaxPictureBytes));
   const std::string_view head = std::string_view(bytes).substr(0, 12);
@@ -142,7 +142,7 @@ Result<Json> AddView(const ViewerView& view, const WorldOrigin& origin, size_t i
               {"picture", std::move(picture)}};
 }
 
-// What the page's cameras hold upright, else what a splat says about itself.
+// Up of the page's cameras, else as the splat states.
 std::array<double, 3> WorldUpOf(const ViewerPage& page) {
   std::vector<Camera> cameras;
   for (const ViewerView& view : page.views) cameras.push_back(view.camera);
@@ -151,7 +151,7 @@ std::array<double, 3> WorldUpOf(const ViewerPage& page) {
   return (page.before ? UpOf(page.before->cloud->comments) : std::nullopt).value_or(kUsualUp);
 }
 
-// Of both splats, each once.
+// Credits of both splats, each once.
 std::vector<std::string> AllCredits(const ViewerPage& page) {
   std::vector<std::string> credits = CreditsOf(page.after.cloud->comments);
   if (!page.before) return credits;
@@ -161,7 +161,7 @@ std::vector<std::string> AllCredits(const ViewerPage& page) {
   return credits;
 }
 
-// Replaces the one occurrence of `mark`; the template is ours, so it is there.
+// Replaces the single occurrence of `mark`, which our template contains.
 void Substitute(std::string& text, std::string_view mark, std::string_view value) {
   text.replace(text.find(mark), mark.size(), value);
 }
@@ -197,12 +197,12 @@ uint64_t EstimatedPageBytes(const GaussianCloud& cloud, int max_sh_degree) {
 
 Status CheckPageSize(const std::filesystem::path& path, const ViewerPage& page) {
   if (page.folder) return {};
-  // Refused before the work is done where that is certain: means and rotations never deflate by more than half.
+  // Rejects early what is certainly too large: means and rotations never deflate below half.
   uint64_t at_least = static_cast<uint64_t>(page.after.cloud == nullptr ? 0 : page.after.cloud->size());
   if (page.before && page.before->cloud != nullptr) at_least += static_cast<uint64_t>(page.before->cloud->size());
   at_least *= kLeastBytes;
   if (at_least > page.max_bytes) return TooLarge(path, at_least, page);
-  // And where a sample says so, which is far sooner than all is compressed.
+  // Rejects by a sample, which is far faster than compressing everything.
   const GaussianCloud* const both[] = {page.after.cloud, page.before ? page.before->cloud : nullptr};
   double most = 0;
   for (const GaussianCloud* cloud : both) {
@@ -258,7 +258,7 @@ Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page
                             {"background", page.background},
                             {"up", WorldUpOf(page)},
                             {"credits", AllCredits(page)},
-                            // The page draws with the renderer's own numbers.
+                            // The page uses the rasterizer's constants.
                             {"constants",
                              {{"minAlpha", kMinAlpha},
                               {"maxAlpha", kMaxAlpha},
@@ -269,10 +269,10 @@ Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page
   std::string head(PageFile("page.html"));
   const std::string end = head.substr(head.find("{{data}}") + std::string_view("{{data}}").size());
   head.resize(head.find("{{data}}"));
-  // Besides what is in the page: scripts beside it, from a disk or a server.
+  // Allows scripts beside the page, from disk or server.
   Substitute(head, "{{scripts}}", page.folder ? " 'self' file:" : "");
   Substitute(head, "{{style}}", PageFile("page.css"));
-  // JSON's way to replace what is not UTF-8 serves the title too.
+  // JSON's replacement of invalid UTF-8 serves the title too.
   const std::string printable_title = Json::parse(Json(title).dump(-1, ' ', false, Json::error_handler_t::replace));
   Substitute(head, "{{title}}", EscapeHtml(printable_title));
   const std::string tail = Cat("<script type=\"application/json\" id=\"description\">", ScriptJson(description),

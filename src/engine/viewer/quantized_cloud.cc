@@ -13,10 +13,11 @@ namespace anchorsplat {
 namespace {
 
 constexpr int64_t kGrain = 1 << 14;
-// A Gaussian e³² times smaller than the largest is a point in any view: scale 0 (a log-scale of −Inf) ends up there.
+// Range of log-scales: a Gaussian e³² times smaller than the largest is a point in any view. Log-scale −Inf ends up
+// there.
 constexpr double kLogScaleSpan = 32;
 constexpr double kLargestLogScaleOfSpread = 20;
-// Colours are ±5 beyond black and white there; a broken file's 1e30 must not take the precision of all others.
+// Limit of SH coefficients, colours ±5 beyond black and white: a broken file's 1e30 must not cost precision.
 constexpr double kCoefficientLimit = 16;
 constexpr double kFloatMax = std::numeric_limits<float>::max();
 
@@ -26,9 +27,8 @@ uint32_t LinearCode(double value, double low, double high, int bits) {
   return static_cast<uint32_t>(std::lround(std::clamp((value - low) / (high - low), 0.0, 1.0) * top));
 }
 
-// wxyz → 2 bits: index of the largest component; then the others in order, 10 bits each, over ±1/√2, which is as large
-// as a component can be beside a larger one. q and −q are the same rotation: the sign is chosen so that the largest is
-// positive.
+// Encodes a quaternion (wxyz): 2 bits for the index of the largest component, then the others in order, 10 bits each
+// over ±1/√2, the maximum beside a larger one. As q and −q are the same rotation, the largest is made positive.
 uint32_t RotationCode(const float* wxyz) {
   std::array<double, 4> q{};
   double largest_magnitude = 0;
@@ -36,9 +36,9 @@ uint32_t RotationCode(const float* wxyz) {
     q[k] = wxyz[k];
     largest_magnitude = std::max(largest_magnitude, std::abs(q[k]));
   }
-  if (!(largest_magnitude > 0)) q = {1, 0, 0, 0};  // as core/rotation.h
+  if (!(largest_magnitude > 0)) q = {1, 0, 0, 0};  // as in core/rotation.h
   double norm = 0;
-  for (double c : q) norm += c * c;  // double: squares of floats neither overflow nor vanish
+  for (double c : q) norm += c * c;  // in double, so that squares of floats neither overflow nor underflow
   norm = std::sqrt(norm);
   size_t largest = 0;
   for (size_t k = 1; k < 4; ++k) {
@@ -62,7 +62,7 @@ uint8_t HarmonicCode(double value, double max) {
   return static_cast<uint8_t>(static_cast<int8_t>(value < 0 ? -code : code));
 }
 
-// Every third bit of the result is one of `v`'s lowest ten.
+// Spreads `v`'s lowest ten bits to every third bit.
 uint32_t SpreadBits(uint32_t v) {
   v = (v | v << 16) & 0x030000FF;
   v = (v | v << 8) & 0x0300F00F;
@@ -77,7 +77,7 @@ struct MeanCode {
   }
 };
 
-// See QuantizedCloud::radius; of every so many Gaussians.
+// QuantizedCloud::radius, from a sample of Gaussians.
 double RadiusOf(const CloudView& cloud, const std::vector<int64_t>& rows, const QuantizedCloud& q) {
   constexpr size_t kSample = 20'000;
   const size_t step = (rows.size() + kSample - 1) / kSample;
@@ -95,7 +95,7 @@ double RadiusOf(const CloudView& cloud, const std::vector<int64_t>& rows, const 
   return radius > 0 ? radius : largest > 0 ? largest : 1;
 }
 
-// Where the middle is and how far things go, of the Gaussians at `rows`.
+// Measures centre and spread of the Gaussians at `rows`.
 void MeasureMeans(const CloudView& cloud, const std::vector<int64_t>& rows, QuantizedCloud& q) {
   std::vector<float> values(rows.size());
   double largest = 0;
@@ -104,7 +104,7 @@ void MeasureMeans(const CloudView& cloud, const std::vector<int64_t>& rows, Quan
     const auto coordinate = [&](int64_t row) { return cloud.means[static_cast<size_t>(3 * row) + axis]; };
     std::transform(rows.begin(), rows.end(), values.begin(), coordinate);
     const float median = Quantile(values, 0.5);
-    q.center[axis] = std::isfinite(median) ? median : 0;  // halfway between ±3e38 is beyond float
+    q.center[axis] = std::isfinite(median) ? median : 0;  // the mean of ±3e38 is beyond float
     for (float& v : values) {
       const double distance = std::abs(static_cast<double>(v) - q.center[axis]);
       largest = std::max(largest, distance);
@@ -122,7 +122,7 @@ void MeasureRanges(const CloudView& cloud, const std::vector<int64_t>& rows, Qua
   q.log_scale = {kInfinity, -kInfinity};
   q.dc = {kInfinity, -kInfinity};
   const auto stride = static_cast<size_t>(cloud.sh_stride());
-  double smallest = kInfinity;  // longest axis of a Gaussian
+  double smallest = kInfinity;  // smallest of the longest axes
   for (const int64_t row : rows) {
     if (!IsDrawn(cloud, row)) continue;
     const auto i = static_cast<size_t>(row);
@@ -143,10 +143,9 @@ void MeasureRanges(const CloudView& cloud, const std::vector<int64_t>& rows, Qua
       }
     }
   }
-  if (!std::isfinite(q.log_scale[1])) q.log_scale = {-kLogScaleSpan, -kLogScaleSpan};  // nothing but points
-  if (!std::isfinite(q.dc[1])) q.dc = {0, 0};                                          // nothing that is drawn
-  // Longer than that beside all others a Gaussian is the same veil over everything, and must not take the precision of
-  // all others.
+  if (!std::isfinite(q.log_scale[1])) q.log_scale = {-kLogScaleSpan, -kLogScaleSpan};  // only points
+  if (!std::isfinite(q.dc[1])) q.dc = {0, 0};                                          // nothing is drawn
+  // A Gaussian longer than this is a uniform veil over everything at any length, and must not cost precision.
   q.log_scale[1] = std::min(q.log_scale[1], std::max(std::log(q.spread), smallest) + kLargestLogScaleOfSpread);
   q.log_scale[0] = std::max(q.log_scale[0], q.log_scale[1] - kLogScaleSpan);
 }
@@ -175,7 +174,8 @@ Result<MeasuredCloud> MeasureCloud(const CloudView& cloud, int max_sh_degree) {
 std::vector<uint8_t> PlanesOf(const CloudView& cloud, const QuantizedCloud& q, std::span<const int64_t> rows) {
   const auto count = static_cast<int64_t>(rows.size());
   const MeanCode mean_code{q};
-  std::vector<std::pair<uint32_t, int64_t>> order(rows.size());  // Morton key, row: a total order, so any sort will do
+  std::vector<std::pair<uint32_t, int64_t>> order(
+      rows.size());  // Morton key, row: a total order, so any sort is stable
   ParallelFor(0, count, kGrain, [&](int64_t first, int64_t last) {
     for (int64_t n = first; n < last; ++n) {
       uint32_t key = 0;

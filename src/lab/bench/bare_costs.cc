@@ -27,7 +27,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Anonymous memory of this process in bytes; 0 where the system does not say.
+// Anonymous memory of this process in bytes; 0 if unknown.
 uint64_t AnonymousBytes() {
   std::ifstream status("/proc/self/status");
   for (std::string word; status >> word;) {
@@ -49,7 +49,7 @@ double Seconds(const std::function<void()>& work) {
 
 uint64_t PeakGrowth(const std::function<void()>& work) {
 #ifdef __GLIBC__
-  malloc_trim(0);  // memory kept from before would be used again without showing as growth
+  malloc_trim(0);  // reused free memory would not show as growth
 #endif
   const uint64_t before = AnonymousBytes();
   std::atomic<bool> done{false};
@@ -70,7 +70,7 @@ uint64_t PeakGrowth(const std::function<void()>& work) {
 Status ReadToNowhere(const fs::path& path) {
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) return Error{ErrorCode::kIo, Cat(path.string(), ": cannot open")};
-  std::vector<char> block(size_t{128} << 10);  // as cat does
+  std::vector<char> block(size_t{128} << 10);  // block size of cat
   while (::read(descriptor, block.data(), block.size()) > 0) {
   }
   ::close(descriptor);

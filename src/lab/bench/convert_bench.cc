@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Mean and standard deviation of value k of a row.
+// Mean and standard deviation of value k in a row.
 struct Spread {
   double mean = 0, deviation = 1;
 };
@@ -101,7 +101,7 @@ Result<ConvertBenchReport> RunConvertBench(const ConvertBenchOptions& options) {
     row.bytes = converted.output_bytes;
     return {};
   };
-  // Everything in every round, so that a slow minute of the machine hits all alike. Files are new every time.
+  // Each round measures everything, so that a slow minute affects all alike. Files are new every time.
   for (int round = 0; status.ok() && round < options.repeats; ++round) {
     best(report.cat_seconds, [&] { return ReadToNowhere(input); });
     {

@@ -29,7 +29,7 @@ struct Iteration {
   RenderStatistics statistics;
 };
 
-// What one thread of control keeps from iteration to iteration.
+// State of a learner kept between iterations.
 struct Learner {
   GaussianCloud cloud;
   CloudOptimizer optimizer;
@@ -46,7 +46,7 @@ Result<Iteration> Iterate(const Camera& camera, const Image& target, Learner& l)
   LearningRates rates;
   rates.scales = rates.opacities = rates.quats = rates.sh0 = rates.sh_rest = 0;
   DensificationOptions densification;
-  densification.refine_start_iter = densification.refine_stop_iter = 2;  // never grows, always gathers
+  densification.refine_start_iter = densification.refine_stop_iter = 2;  // accumulates but never grows
   densification.opacity_reset = OpacityReset::kNever;
   Iteration it;
   const double start = Now();
@@ -79,7 +79,8 @@ GaussianCloud Disturbed(const GaussianCloud& cloud, uint64_t seed) {
   return out;
 }
 
-// Many, faint, overlapping: as many in one place let through what the one did, none more transparent than fits prune.
+// Splits into many faint overlapping Gaussians: together they transmit what the one did, and none is below pruning
+// opacity.
 GaussianCloud Dense(const GaussianCloud& cloud, int split, uint64_t seed) {
   GaussianCloud out = SplitGaussians(cloud, split, seed);
   constexpr double kFaintest = 0.0051;
@@ -110,7 +111,7 @@ Result<FitBenchRow> BenchOne(const GaussianCloud& cloud, const std::string& scen
   for (int repeat = 0; repeat <= options.repeats; ++repeat) {
     for (size_t view = 0; view < best.size(); ++view) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(const Iteration it, Iterate(set.cameras[view], targets[view], learner));
-      if (repeat <= 1 || it.seconds < best[view].seconds) best[view] = it;  // the first one allocates
+      if (repeat <= 1 || it.seconds < best[view].seconds) best[view] = it;  // the first run allocates
     }
   }
   FitBenchRow row;

@@ -14,17 +14,17 @@ struct FitBenchOptions {
   int poses = 8;                          // on an orbit around the origin
   double radius = 1.7;                    // world units
   double fov_degrees = 45;                // horizontal; square pictures
-  int repeats = 10;                       // over all poses, after one that warms up; per pose the fastest counts
-  int split = 1;      // > 1: dense, every Gaussian becomes so many smaller and fainter ones at places within it
-  uint64_t seed = 1;  // of what has to be learnt, and of the places
+  int repeats = 10;                       // over all poses, after a warm-up; the fastest counts per pose
+  int split = 1;      // > 1: a dense cloud; splits every Gaussian into this many smaller and fainter ones
+  uint64_t seed = 1;  // of the target's disturbance and of split positions
 };
 
-// One iteration of a fit: picture, loss, gradient, a step of Adam and what densification gathers. Means over the poses.
+// One iteration of a fit: render, loss, gradient, Adam step and densification's sums. Means over the poses.
 struct FitBenchRow {
   std::string scene;
   int64_t gaussians = 0;
   int width = 0;
-  double ms = 0;  // all stages and what lies between
+  double ms = 0;  // all stages, including what lies between
   double project_ms = 0, spherical_harmonics_ms = 0, sort_ms = 0, bin_ms = 0, blend_ms = 0;
   double loss_ms = 0;
   double blend_backward_ms = 0, project_backward_ms = 0;
@@ -32,11 +32,10 @@ struct FitBenchRow {
   int64_t visible = 0, pairs = 0, evaluations = 0;  // see RenderStatistics
 };
 
-// Iterations on `cloud` towards pictures of the same cloud with every mean and colour disturbed a little, so that
-// gradients are everywhere as they are in a fit that is under way. The rates are 0: all work is done, but every
-// iteration is the same.
+// Times iterations on `cloud` towards pictures of the same cloud with slightly disturbed means and colours, so that
+// gradients are as dense as during a fit. Learning rates are 0: all work is done, but every iteration is the same.
 //
-// Errors (kBadArgument): an invalid or empty cloud, options that are not positive.
+// Errors (kBadArgument): an invalid or empty cloud; options that are not positive.
 Result<std::vector<FitBenchRow>> BenchFit(const GaussianCloud& cloud, const std::string& scene,
                                           const FitBenchOptions& options = {});
 

@@ -24,7 +24,7 @@ namespace anchorsplat {
 namespace {
 
 constexpr int kViews = 8;
-constexpr uint64_t kViewBytes = uint64_t{48} << 20;  // of all their pictures
+constexpr uint64_t kViewBytes = uint64_t{48} << 20;  // of all their pictures together
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
 Error Stopped() { return {ErrorCode::kInterrupted, "stopped"}; }
@@ -35,7 +35,7 @@ RenderOptions WithGradient() {
   return options;
 }
 
-// The fastest of some repeats of `what`, which gives the seconds that are to be compared.
+// The fastest of several repeats; `what` returns the seconds to compare.
 template <typename T>
 Result<T> Fastest(const GpuBenchOptions& options, const std::function<Result<T>()>& what,
                   const std::function<double(const T&)>& seconds) {
@@ -49,7 +49,7 @@ Result<T> Fastest(const GpuBenchOptions& options, const std::function<Result<T>(
   return *std::move(best);
 }
 
-// A splat, the picture of it and its gradient.
+// A splat, its picture and gradient.
 struct Load {
   const GaussianCloud& cloud;
   const Camera& camera;
@@ -57,7 +57,7 @@ struct Load {
   RenderOptions options = WithGradient();
 };
 
-// One of them on a GPU, where all of it stays.
+// A load resident on a GPU.
 class OnGpu {
  public:
   OnGpu(std::shared_ptr<GpuDevice> device, const Load& load)
@@ -94,7 +94,7 @@ class OnGpu {
     const Pinhole& k = load_.camera.intrinsics;
     ANCHORSPLAT_RETURN_IF_ERROR(
         backward_.Blend(load_.options, GpuPictureGradient{weights_.get(), {0, 0, k.width, k.height}}));
-    // As Rasterizer::Backward does: of these the rows are uploaded again or read on the host.
+    // As in Rasterizer::Backward: such rows are uploaded again or read on the host.
     if (cloud_.empty() || !cloud_.resident() || !rasterizer_.unusual_rows.empty()) {
       ANCHORSPLAT_RETURN_IF_ERROR(cloud_.Assign(*device_, load_.cloud));
     }
@@ -105,7 +105,7 @@ class OnGpu {
     return Backward([](const GpuGradient&) { return Status(); });
   }
 
-  // In the order of kGpuBenchGradients.
+  // Gradients in the order of kGpuBenchGradients.
   Result<std::array<Buffer<float>, 6>> ReadGradient() {
     std::array<Buffer<float>, 6> columns;
     const auto n = static_cast<size_t>(load_.cloud.size());
@@ -125,7 +125,7 @@ class OnGpu {
     return columns;
   }
 
-  // Rows of the visible Gaussians by depth.
+  // Rows of visible Gaussians by depth.
   Result<std::vector<uint32_t>> ReadOrder() {
     std::vector<uint32_t> order(static_cast<size_t>(rasterizer_.visible));
     if (order.empty()) return order;
@@ -134,7 +134,7 @@ class OnGpu {
     return order;
   }
 
-  // Pictures by the same camera, either way.
+  // Renders views of the same camera both ways.
   Result<GpuBenchViews> Views(const RenderOptions& options, int count) {
     GpuBenchViews views;
     views.count = count;
@@ -148,7 +148,7 @@ class OnGpu {
       }
       pictures.push_back({.camera = load_.camera, .near = options.near_plane, .output = together[v]});
     }
-    for (int pass = 0; pass < 2; ++pass) {  // the first one allocates
+    for (int pass = 0; pass < 2; ++pass) {  // the first pass allocates
       int64_t waits = device_->waits();
       Stopwatch watch;
       for (RenderOutput& output : alone) {
@@ -193,7 +193,7 @@ struct BothWays {
   double InAll() const { return forward + backward; }
 };
 
-// As good as both are.
+// The fastest of either way.
 Result<BothWays> FastestBothWays(const GpuBenchOptions& options, const std::function<Result<BothWays>()>& what) {
   return Fastest<BothWays>(options, what, [](const BothWays& both) { return both.InAll(); });
 }
@@ -253,7 +253,7 @@ Result<std::vector<KernelTime>> TimeKernels(const std::shared_ptr<KernelClock>& 
   OnGpu gpu(clock, load);
   ANCHORSPLAT_RETURN_IF_ERROR(gpu.Upload());
   ANCHORSPLAT_RETURN_IF_ERROR(gpu.UploadWeights());
-  for (int pass = 0; pass < 2; ++pass) {  // the first one allocates
+  for (int pass = 0; pass < 2; ++pass) {  // the first pass allocates
     if (StopRequested()) return Stopped();
     clock->Reset();
     ANCHORSPLAT_RETURN_IF_ERROR(gpu.Forward());
@@ -267,7 +267,7 @@ Status MeasureKernels(const DeviceChoice& choice, const std::shared_ptr<GpuDevic
   const auto clock = std::make_shared<KernelClock>(device);
   ANCHORSPLAT_ASSIGN_OR_RETURN(row.kernels, TimeKernels(clock, load));
   row.kernels_by_gpu = clock->by_gpu();
-  // What this cannot do is no failure of the row.
+  // Failing here is no failure of the row.
   const Result<std::shared_ptr<GpuDevice>> unchecked = OpenUncheckedGpu(choice);
   const Result<std::vector<KernelTime>> times =
       unchecked.ok() ? TimeKernels(std::make_shared<KernelClock>(*unchecked), load) : unchecked.error();
@@ -294,8 +294,7 @@ double RelativeL2(const Buffer<float>& a, const Buffer<float>& b) {
   return std::sqrt(difference / size);
 }
 
-// Places where the Gaussians that the GPU has put in order stand otherwise by the CPU's depths; render/project.cc has
-// the formula.
+// Number of positions in the GPU's depth order that differ by the CPU's depths (formula: render/project.cc).
 int64_t OutOfOrder(const Load& load, const std::vector<uint32_t>& order) {
   const Pose& pose = load.camera.world_to_camera;
   Buffer<float> depths(static_cast<size_t>(load.cloud.size()));
@@ -316,7 +315,7 @@ void CountBeyond(const Image& gpu, const Image& cpu, GpuBenchReference& referenc
   for (size_t i = 0; i < cpu.pixels.size(); ++i) {
     const double difference = std::abs(double{gpu.pixels[i]} - double{cpu.pixels[i]});
     ++reference.values;
-    if (!(difference <= 1e-4 * std::max(1.0, std::abs(double{cpu.pixels[i]})))) ++reference.beyond;  // NaN, too
+    if (!(difference <= 1e-4 * std::max(1.0, std::abs(double{cpu.pixels[i]})))) ++reference.beyond;  // also for NaN
   }
 }
 
@@ -353,8 +352,8 @@ Status MeasureCpu(const Load& load, const GpuBenchOptions& options, OnGpu& gpu, 
   return {};
 }
 
-// What a picture and its gradient will take the CPU, by those before: at most in proportion to Gaussians and pixels. 0
-// for the first.
+// Upper estimate of the CPU's time for a picture and gradient, in proportion to Gaussians and pixels of earlier rows. 0
+// for the first row.
 double ExpectedOnCpu(const std::vector<GpuBenchRow>& rows, const GpuBenchRow& next) {
   double least = kNever;
   for (const GpuBenchRow& row : rows) {
@@ -368,7 +367,7 @@ double ExpectedOnCpu(const std::vector<GpuBenchRow>& rows, const GpuBenchRow& ne
 
 Status MeasureRow(const DeviceChoice& choice, const GaussianCloud& cloud, const GpuBenchOptions& options,
                   double expected_on_cpu, GpuBenchRow& row) {
-  // A device that was lost is opened again.
+  // Reopens a lost device.
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::shared_ptr<GpuDevice> device, OpenGpu(choice));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Camera camera, GpuBenchCamera(row.width, row.height));
   RenderGradient weights = GpuBenchWeights(row.width, row.height, options.seed + 1);

@@ -9,14 +9,14 @@
 
 namespace anchorsplat {
 
-// The load of `bench gpu`, the same on every machine: a bumpy ball of about one unit around the origin, whose surface
-// `count` Gaussians of degree 3 cover about five times over, however many they are.
+// The splat of `bench gpu`, the same on every machine: a bumpy ball of about one unit around the origin, whose surface
+// `count` Gaussians of degree 3 cover about five times, whatever their number.
 GaussianCloud GpuBenchCloud(int64_t count, uint64_t seed);
 
-// All of it, from the side and a little above; 45° along the shorter side. Errors: of LookAt, which there are none of.
+// A camera that sees all of it from the side and slightly above; 45° along the shorter side. Cannot fail.
 Result<Camera> GpuBenchCamera(int width, int height);
 
-// ∂L/∂ of every pixel, between -1 and 1.
+// ∂L/∂pixel for every pixel, uniform in −1 … 1.
 RenderGradient GpuBenchWeights(int width, int height, uint64_t seed);
 
 }  // namespace anchorsplat

@@ -69,9 +69,8 @@ Result<IoBenchReport> RunIoBench(const IoBenchOptions& options) {
     return {};
   };
   const Buffer<char> bytes(report.file_bytes, 'x');
-  // All kinds in every round, so that a slow minute of the machine hits them alike, and the two writers take turns to
-  // be first, as the kernel may slow down whoever writes second. Files are new every time: writing into pages that are
-  // cached already is another thing.
+  // Each round measures everything, so that a slow minute affects all alike. The two writers alternate in order, as the
+  // kernel may slow down whoever writes second. Files are new every time, because rewriting cached pages is different.
   for (int round = 0; status.ok() && round < options.repeats; ++round) {
     const GaussianCloud cloud = RandomCloud(options.gaussians, options.sh_degree);
     for (const bool write_bare : {round % 2 == 0, round % 2 != 0}) {

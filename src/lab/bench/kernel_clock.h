@@ -15,17 +15,16 @@
 
 namespace anchorsplat {
 
-// What one kernel took, of all its calls.
+// Total time of one kernel over all its calls.
 struct KernelTime {
   std::string entry;
   int calls = 0;
   double seconds = 0;
-  std::optional<double> unchecked;  // seconds of the same without checks at run time; for those who measure it
+  std::optional<double> unchecked;  // seconds without run-time checks, if measured
 };
 
-// A device that waits for every kernel, in front of one that does not, and so knows what each of them takes: by the
-// GPU's clock or, where that has none, by the host's, which counts a round trip to the device with each call. Buffers
-// are the other's. For one thread.
+// A device that forwards to another one and waits after every kernel to time it: by the GPU's clock or, without one, by
+// the host's, which includes a round trip per call. Not thread-safe.
 class KernelClock final : public GpuDevice {
  public:
   explicit KernelClock(std::shared_ptr<GpuDevice> gpu) : gpu_(std::move(gpu)) {}
@@ -34,8 +33,8 @@ class KernelClock final : public GpuDevice {
     times_.clear();
     by_gpu_ = true;
   }
-  bool by_gpu() const { return by_gpu_; }                          // the clock
-  const std::vector<KernelTime>& times() const { return times_; }  // in the order of the first calls
+  bool by_gpu() const { return by_gpu_; }                          // whether the GPU's clock was used
+  const std::vector<KernelTime>& times() const { return times_; }  // in order of first calls
 
   const GpuAdapter& adapter() const override { return gpu_->adapter(); }
   Result<GpuMemory> Allocate(uint64_t bytes, std::string_view what) override { return gpu_->Allocate(bytes, what); }
@@ -49,7 +48,7 @@ class KernelClock final : public GpuDevice {
   }
   void Run(const GpuKernel& kernel, std::span<const std::byte> parameters, std::initializer_list<GpuBinding> bindings,
            uint32_t groups) override {
-    // A failure sticks and is met by whoever reads.
+    // Failures are sticky; whoever reads next reports them.
     if (!gpu_->Wait().ok()) return;
     Stopwatch watch;
     const std::optional<double> of_gpu = gpu_->RunTimed(kernel, parameters, bindings, groups);

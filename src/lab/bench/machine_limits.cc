@@ -24,8 +24,8 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// `rounds` times twelve independent multiply-adds: more than latency times units of any processor so far. Returns
-// their sum, so that nothing can be left out, and how many scalar multiply-adds it made.
+// Makes `rounds` × twelve independent multiply-adds, more than latency × units of any processor so far. Returns their
+// sum, so that nothing is optimised away, and the number of scalar multiply-adds.
 void MultiplyAdd(int64_t rounds, float* sum, int64_t* made) {
   const hn::ScalableTag<float> d;
   const auto m = hn::Set(d, 0.999f), a = hn::Set(d, 0.001f);
@@ -42,7 +42,7 @@ void MultiplyAdd(int64_t rounds, float* sum, int64_t* made) {
   *made = rounds * 12 * static_cast<int64_t>(hn::Lanes(d));
 }
 
-// Sum of [first, last), whose length is a multiple of 64 floats.
+// Sum of [first, last), of a multiple of 64 floats.
 float Read(const float* HWY_RESTRICT first, const float* last) {
   const hn::CappedTag<float, 16> d;
   const size_t lanes = hn::Lanes(d);
@@ -72,7 +72,7 @@ HWY_EXPORT(InstructionSet);
 
 namespace {
 
-// The shortest of several tries: everything that disturbs makes it longer.
+// The shortest of several tries, because disturbances only lengthen it.
 template <typename Work>
 double BestSeconds(int tries, Work&& work) {
   double best = std::numeric_limits<double>::infinity();
@@ -103,7 +103,7 @@ MachineLimits MeasureMachineLimits() {
   });
   for (const int64_t m : made) limits.fma_per_second += static_cast<double>(m) / seconds;
 
-  constexpr int64_t kFloats = int64_t{64} << 20;  // 256 MiB: beyond any cache
+  constexpr int64_t kFloats = int64_t{64} << 20;  // 256 MiB, larger than any cache
   constexpr int64_t kPiece = int64_t{1} << 16;
   Buffer<float> memory(static_cast<size_t>(kFloats));
   std::vector<float> totals(static_cast<size_t>(kFloats / kPiece));

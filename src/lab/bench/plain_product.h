@@ -9,8 +9,8 @@
 
 namespace anchorsplat {
 
-// A plain matrix product, whose rate networks are measured against: as many rows as the demo of the published network
-// has Gaussians, its widest layer.
+// A matrix product as the reference rate for networks. It has the shape of the published network's widest layer on the
+// demo's Gaussians.
 class PlainProduct {
  public:
   explicit PlainProduct(WeightPrecision precision) : input_(kRows * kInputs), out_(kRows * kOutputs) {

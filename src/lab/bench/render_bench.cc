@@ -16,11 +16,11 @@ namespace anchorsplat {
 
 namespace {
 
-// Of one evaluation of a Gaussian for a 4×4 block, per pixel: 5 for its exponent, 5 for the exponential, 2 for weight
-// and transmittance, 3 for the colour.
+// Per pixel, for one Gaussian on a 4×4 block: 5 for the exponent, 5 for the exponential, 2 for weight and
+// transmittance, 3 for the colour.
 constexpr double kBlendMultiplications = 15;
 constexpr double kBlockPixels = 16;
-constexpr double kProjectedBytes = 64 + 8;  // written per Gaussian: its record and its tiles
+constexpr double kProjectedBytes = 64 + 8;  // written per Gaussian: record and tile range
 
 struct Measurement {
   double seconds = 0;
@@ -63,7 +63,7 @@ Result<RenderBenchRow> BenchOne(const GaussianCloud& cloud, const std::string& s
   best.seconds = std::numeric_limits<double>::infinity();
   for (int repeat = 0; repeat <= options.repeats; ++repeat) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Measurement m, RenderAll(rasterizer, cloud, set, output));
-    if (repeat > 0 && m.seconds < best.seconds) best = m;  // the first one allocates
+    if (repeat > 0 && m.seconds < best.seconds) best = m;  // the first run allocates
   }
   RenderBenchRow row;
   row.scene = scene;
@@ -128,7 +128,7 @@ Result<RenderBenchReport> BenchRender(const GaussianCloud& cloud, const std::str
     return Error{ErrorCode::kBadArgument,
                  Cat(scene, ": split ", options.split, "-fold, these are more Gaussians than ", "can be drawn")};
   }
-  // Refused before anything takes time.
+  // Rejects bad options before anything slow.
   const auto orbit = OrbitCameras(options.poses, options.radius, {0, 0, 0}, PinholeFromFov(1, 1, 1));
   if (!orbit.ok()) return orbit.error();
   RenderBenchReport report;

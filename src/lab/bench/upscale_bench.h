@@ -6,21 +6,22 @@
 namespace anchorsplat {
 
 struct UpscaleBenchOptions {
-  int width = 200;  // pixels of the picture that is enlarged
+  int width = 200;  // of the input picture, pixels
   int height = 150;
-  int repeats = 5;  // after one that warms up; the fastest counts
+  int repeats = 5;  // after a warm-up; the fastest counts
 };
 
 struct UpscaleBenchReport {
   int threads = 0;
-  double seconds = 0;        // of one picture, without reading and writing
-  double multiply_adds = 0;  // of it, without what tiles do twice
-  double gemm_flops = 0;     // 2·multiply-adds per second of a plain product in fp32
-  double ratio = 0;          // seconds over the time that this rate would need for the same multiply-adds
+  double seconds = 0;        // per picture, without reading and writing
+  double multiply_adds = 0;  // per picture, without tile overlaps
+  double gemm_flops = 0;     // 2·multiply-adds per second of a plain fp32 product
+  double ratio = 0;          // seconds over the time for the same multiply-adds at that rate
 };
 
-// Times a network on a picture of noise. Matrix product and network take turns, so that both see the same machine.
-// Errors: those of Upscaler::Enlarge; kBadArgument when repeats < 1.
+// Times a network on a picture of noise. Alternates matrix product and network, so that both see the same machine
+// state.
+// Errors: those of Upscaler::Enlarge; kBadArgument: repeats < 1.
 Result<UpscaleBenchReport> BenchUpscale(Upscaler& network, const UpscaleBenchOptions& options = {});
 
 }  // namespace anchorsplat

@@ -27,7 +27,7 @@ Color Mix(const Color& a, const Color& b, float t) {
   return out;
 }
 
-// Smooth random values on the unit square, `cells` of them a side.
+// Smooth random values on the unit square, on a grid of `cells` per side.
 class ValueNoise {
  public:
   ValueNoise(int cells, Random& random) : cells_(cells), values_(static_cast<size_t>((cells + 1) * (cells + 1))) {
@@ -83,7 +83,7 @@ Poster RandomPoster(Random& random) {
   return p;
 }
 
-// What hangs on one wall and what it is made of.
+// Picture of one wall: its material and posters.
 Texture WallPicture(uint64_t seed, int wall) {
   Random random(seed * 6 + static_cast<uint64_t>(wall));
   const Color dark = RandomColor(random, 0.15, 0.6), light = RandomColor(random, 0.5, 1);
@@ -107,7 +107,7 @@ Texture WallPicture(uint64_t seed, int wall) {
       const float t = (static_cast<float>(y) + 0.5f) / kBackdropPixels;
       float shade = 0;
       for (const auto& [noise, share] : octaves) shade += noise.At(s, t) * share / sum;
-      // The mean of many random numbers stays near a half.
+      // Sums of many random numbers stay near ½, so contrast is increased.
       Color color = Mix(dark, light, std::clamp(0.5f + 2.5f * (shade - 0.5f), 0.0f, 1.0f));
       const float u = s * tiles - std::floor(s * tiles), v = t * tiles - std::floor(t * tiles);
       if (std::min(u, v) < 0.05f) color = Mix(color, dark, 0.7f);

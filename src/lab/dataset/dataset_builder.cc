@@ -42,7 +42,7 @@ ObjectFailure DescribeFailure(const ObjectJob& job, const fs::path& folder, cons
   return failure;
 }
 
-constexpr const char* kBaseStage = "base";  // of objects that are made from another one (object_builder.cc)
+constexpr const char* kBaseStage = "base";  // of derived objects (object_builder.cc)
 
 bool SameSettings(const ObjectRecord& record, const ObjectJob& job) {
   ObjectJob there = job;
@@ -56,12 +56,12 @@ Result<ObjectRecord> ReadRecord(const fs::path& folder) {
   return ObjectRecordFrom(json.root());
 }
 
-// One build: what is there, what is wanted, and the lists that say so after every object.
+// One build: existing and wanted objects, and the lists that are updated after every object.
 class DatasetBuild {
  public:
   DatasetBuild(const fs::path& dataset, const DatasetBuildOptions& options) : dataset_(dataset), options_(options) {}
 
-  // Reads the lists of earlier builds and finds out which objects are wanted.
+  // Reads lists of earlier builds and determines the wanted objects.
   Status Plan(const std::vector<std::string>& meshes) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(manifest_, CollectRecords(dataset_));
     ANCHORSPLAT_ASSIGN_OR_RETURN(const auto earlier, ReadFailures(dataset_));
@@ -82,7 +82,7 @@ class DatasetBuild {
     return WriteLists();
   }
 
-  // Makes the wanted ones, a process each; those that are made from others when these are there.
+  // Builds the wanted objects, one process each; derived ones after all others.
   Status Run() {
     progress_.emplace("objects", std::ssize(wanted_));
     Status status = RunAll(Wanted(false));
@@ -91,7 +91,7 @@ class DatasetBuild {
     return status;
   }
 
-  // The wanted ones as files, for processes that others start.
+  // Writes the wanted jobs as files, for processes started elsewhere.
   Result<std::vector<PlannedObject>> WriteJobs() const {
     std::vector<PlannedObject> planned;
     for (const bool derived : {false, true}) {
@@ -125,7 +125,7 @@ class DatasetBuild {
     return jobs;
   }
 
-  // Those of the jobs whose base is there; the others have failed.
+  // Jobs whose base exists; records the others as failed.
   std::vector<const ObjectJob*> WithBase(std::vector<const ObjectJob*> jobs) {
     std::erase_if(jobs, [&](const ObjectJob* job) {
       const bool remade = !options_.overwrite || unfinished_.count(job->base) == 0;
@@ -155,18 +155,18 @@ class DatasetBuild {
     return lists;
   }
 
-  // What failed before has failed still, unless it is tried again.
+  // Keeps earlier failures, except those to be retried.
   void CarryFailures(const std::vector<std::string>& meshes, const std::vector<ObjectFailure>& earlier) {
     for (const ObjectFailure& failure : earlier) {
-      // Libraries are looked into on every build.
+      // Libraries are read again in every build.
       const bool asked_for = std::find(meshes.begin(), meshes.end(), failure.source) != meshes.end();
       if (failure.stage == kReadStage && asked_for) continue;
-      if (failure.stage == kBaseStage && manifest_.count(BaseOf(failure.name)) > 0) continue;  // by now it is there
+      if (failure.stage == kBaseStage && manifest_.count(BaseOf(failure.name)) > 0) continue;  // its base now exists
       if (!options_.retry && manifest_.count(failure.name) == 0) failures_.emplace(failure.name, failure);
     }
   }
 
-  // Of a job of this build; empty: none.
+  // Base of a job of this build; empty if none.
   std::string BaseOf(const std::string& name) const {
     const auto job = std::find_if(jobs_.begin(), jobs_.end(), [&](const ObjectJob& j) { return j.name == name; });
     return job == jobs_.end() ? std::string() : job->base;
@@ -204,14 +204,14 @@ class DatasetBuild {
     std::error_code ignored;
     if (options_.overwrite) fs::remove_all(folder, ignored);
     const fs::path file = folder.string() + ".job";
-    // A job that cannot be written fails in the process, which says why.
+    // If this fails, the process will report it.
     (void)WriteWholeFile(file, ToJsonText(job), true);
     return ProcessTask{{options_.program.string(), "dataset", "object", file.string(), "-o", dataset_.string(),
                         "--threads", std::to_string(options_.threads), "--quiet"},
                        folder.string() + ".log"};
   }
 
-  // Puts the object into the manifest or among the failures; a word about it.
+  // Records the outcome in the manifest or among the failures. Returns a short description.
   std::string TakeResult(const ObjectJob& job, const ProcessEnd& end) {
     const fs::path folder = BuildingFolder(dataset_, job.name);
     failures_.erase(job.name);
@@ -241,7 +241,7 @@ class DatasetBuild {
   std::map<std::string, ObjectFailure> failures_;
   std::vector<ObjectJob> jobs_;
   std::vector<const ObjectJob*> wanted_;
-  std::set<std::string> unfinished_;  // wanted, and not yet made
+  std::set<std::string> unfinished_;  // wanted and not built yet
   std::optional<Progress> progress_;
   DatasetBuildReport report_;
 };

@@ -24,7 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The problems of one object, in the order they are found.
+// Checks one object; problems in order of discovery.
 class ObjectCheck {
  public:
   ObjectCheck(const fs::path& dataset, const ObjectRecord& record, bool decode)

@@ -11,25 +11,24 @@
 
 namespace anchorsplat {
 
-// Something that is not as it should be.
+// A defect of a data set.
 struct DatasetProblem {
-  std::string object;    // empty: the data set as a whole
-  std::string sentence;  // with the file
+  std::string object;    // empty: concerns the whole data set
+  std::string sentence;  // names the file
 };
 
 struct DatasetCheckOptions {
-  bool decode = false;  // read every picture's pixels, not only its size
+  bool decode = false;  // decodes every picture instead of reading only its size
 };
 
-// Looks at everything a data set promises: every object of the manifest is there and says the same, has all its views
-// at their sizes, a splat of as many Gaussians as its record says, in both files, all finite; no objects that the
-// manifest does not know; no model in two splits; nothing that a build was to make and has not, because it was killed
-// or is still at work. Problems come sorted by object. Errors: kNotFound: no manifest; kBadFile: of the manifest or the
-// list of failures.
+// Verifies a data set. Every object of the manifest exists with the same record, all views at their sizes, and a finite
+// splat with the recorded number of Gaussians in both files. There are no objects outside the manifest, no model in two
+// splits, and nothing unfinished from a build that was killed or still runs. Returns problems sorted by object.
+// Errors: kNotFound: no manifest; kBadFile: of the manifest or the list of failures.
 Result<std::vector<DatasetProblem>> CheckDataset(const std::filesystem::path& dataset,
                                                  const DatasetCheckOptions& options = {});
 
-// Numbers of a data set as a whole.
+// Statistics of a data set.
 struct DatasetSummary {
   struct Part {
     int64_t objects = 0;
@@ -37,16 +36,16 @@ struct DatasetSummary {
     double held_out_psnr = 0;
     double gaussians = 0;
   };
-  int64_t objects = 0;  // that are no rejects
+  int64_t objects = 0;  // without rejected ones
   int64_t rejected = 0;
   int64_t failed = 0;
-  int64_t unfinished = 0;                 // begun or listed by a build, neither done nor failed
-  Part all;                               // without rejects
+  int64_t unfinished = 0;                 // begun or listed by a build, but neither done nor failed
+  Part all;                               // without rejected ones
   std::map<std::string, Part> recipes;    // by entry
   std::map<std::string, int64_t> splits;  // objects; empty without splits.json
   std::map<std::string, int64_t> licences;
   std::map<std::string, int64_t> failures;                     // by stage
-  double read_seconds = 0, view_seconds = 0, fit_seconds = 0;  // sums, rejects included
+  double read_seconds = 0, view_seconds = 0, fit_seconds = 0;  // totals, including rejected ones
   uint64_t bytes = 0;                                          // on disk
 };
 Result<DatasetSummary> SummarizeDataset(const std::filesystem::path& dataset);

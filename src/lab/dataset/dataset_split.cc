@@ -24,7 +24,7 @@ bool IsSplitName(const std::string& name) {
   return std::find(std::begin(kSplitNames), std::end(kSplitNames), name) != std::end(kSplitNames);
 }
 
-// "a/b/c.obj" ends with address "b/c.obj", not with "bb/c.obj".
+// Whether `source` ends with the whole address: "a/b/c.obj" matches "b/c.obj" but not "bb/c.obj".
 bool EndsWithAddress(const std::string& source, const std::string& address) {
   if (!source.ends_with(address)) return false;
   return source.size() == address.size() || address.starts_with("/") ||
@@ -34,7 +34,7 @@ bool EndsWithAddress(const std::string& source, const std::string& address) {
 }  // namespace
 
 std::vector<std::vector<std::string>> VariantGroups(const Manifest& manifest, bool by_name) {
-  // Every object, stem and fingerprint is a node; those of one object are joined.
+  // Union-find over objects, stems and fingerprints; those of one object are joined.
   std::map<std::string, std::string> parent;
   const std::function<std::string(const std::string&)> root = [&](const std::string& node) {
     std::string at = node;
@@ -65,7 +65,7 @@ Result<Splits> SplitByModel(const Manifest& manifest, const SplitFractions& frac
   }
   Splits splits;
   for (const auto& group : VariantGroups(manifest, true)) {
-    // Not the first name: a variant that comes later may sort before it.
+    // The smallest stem, not the first name: a later variant may sort before it.
     std::string stem = manifest.at(group[0]).stem;
     for (const std::string& name : group) stem = std::min(stem, manifest.at(name).stem);
     const double u = static_cast<double>(StableHash(stem, seed) >> 11) * 0x1.0p-53;
@@ -144,7 +144,7 @@ Result<std::vector<std::string>> ReadAddressList(const fs::path& path) {
 }
 
 Result<std::vector<std::string>> ResolveAddresses(const std::vector<std::string>& addresses, const fs::path& objects) {
-  std::map<std::string, std::vector<fs::path>> libraries;  // by file name, looked for once
+  std::map<std::string, std::vector<fs::path>> libraries;  // by file name, searched once
   bool looked = false;
   std::vector<std::string> out;
   for (const std::string& address : addresses) {

@@ -20,14 +20,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The settings without what tells the base and what is made from it apart.
+// The settings that a base and its derived objects must share.
 std::string Shared(ObjectSettings settings) {
   settings.from.clear();
   settings.after.clear();
   return ToJson(settings).dump();
 }
 
-// A hard link, or a copy where the file system has none.
+// Creates a hard link, or a copy if the file system has none.
 Status Link(const fs::path& from, const fs::path& to) {
   std::error_code code;
   fs::create_hard_link(from, to, code);

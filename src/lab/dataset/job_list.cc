@@ -12,7 +12,7 @@ namespace anchorsplat {
 
 namespace {
 
-// Object names without what a recipe's entry adds, by mesh.
+// Known object names without the suffix of the recipe's entry, by mesh.
 std::map<std::string, std::string> KnownNames(const Recipe& recipe, const Manifest& there,
                                               const std::vector<ObjectFailure>& failed) {
   std::map<std::string, std::string> names;
@@ -33,12 +33,12 @@ std::map<std::string, std::string> KnownNames(const Recipe& recipe, const Manife
   return names;
 }
 
-// Of "models/chair/model.obj": "chair"; empty where the address has no folder.
+// "chair" for "models/chair/model.obj"; empty if the address has no folder.
 std::string FolderOf(const std::string& address) {
   return std::filesystem::path(address.substr(0, address.rfind(".sh3f#"))).parent_path().filename().string();
 }
 
-// A name that is not taken yet, and takes it.
+// Makes a name unique and reserves it.
 std::string TakeName(std::string name, std::set<std::string>& taken) {
   const std::string base = name;
   for (int i = 2; !taken.insert(name).second; ++i) name = Cat(base, "-", i);
@@ -51,8 +51,8 @@ JobList ListJobs(const std::vector<std::string>& meshes, const Recipe& recipe, c
                  const std::vector<ObjectFailure>& failed) {
   JobList list;
   std::set<std::string> addresses;
-  std::map<std::string, int64_t> places;          // in the list, by address
-  std::map<std::string, std::string> unreadable;  // why, by library
+  std::map<std::string, int64_t> places;          // index in the list, by address
+  std::map<std::string, std::string> unreadable;  // error, by library
   for (std::string mesh : meshes) {
     while (mesh.size() > 1 && mesh.back() == '/') mesh.pop_back();  // a folder of pictures
     const auto expanded = ExpandMeshAddress(mesh);
@@ -67,7 +67,7 @@ JobList ListJobs(const std::vector<std::string>& meshes, const Recipe& recipe, c
 
   const auto known = KnownNames(recipe, there, failed);
   std::set<std::string> taken;
-  std::map<std::string, std::vector<std::string>> fresh;  // meshes without a name yet, by the one they would like
+  std::map<std::string, std::vector<std::string>> fresh;  // meshes without a name yet, by preferred name
   std::map<std::string, std::string> names;               // by mesh
   for (const std::string& address : addresses) {
     const auto found = known.find(address);

@@ -10,23 +10,23 @@
 
 namespace anchorsplat {
 
-// What a build has to do.
+// The work of a build.
 struct JobList {
   std::vector<ObjectJob> jobs;          // by name
-  std::vector<ObjectFailure> failures;  // libraries that cannot be read; stage kReadStage
+  std::vector<ObjectFailure> failures;  // unreadable libraries; stage kReadStage
 };
 
-// Stage of a failure of which no process was begun.
+// Stage of failures before any process was started.
 inline constexpr const char* kReadStage = "read";
 
-// The jobs of every mesh (address of a file, of an object of a furniture library, or of a whole library; or a folder of
-// pictures) for each entry that its recipe draws. A mesh that is given twice is one.
+// Lists the jobs of every mesh (address of a file, of an object of a furniture library, of a whole library, or a folder
+// of pictures) for each recipe entry it draws. Duplicate meshes count once.
 //
-// Names are ObjectName's. Meshes of one name get their folder's in front ("chair/model.obj" and "table/model.obj":
-// chair-model and table-model); those that still share one are numbered in the order of their addresses ("-2", "-3").
-// The order in which meshes are given has no part in names; it says which are the first for RecipeEntry::objects, the
-// objects of a library in the library's order. Meshes that `there` or `failed` know keep their names, so that
-// a list that has grown goes on with the same objects.
+// Names come from ObjectName. Meshes of equal name get their folder's as prefix ("chair/model.obj" and
+// "table/model.obj": chair-model and table-model); those still equal are numbered in address order ("-2", "-3"). The
+// order of meshes does not affect names; it decides which are the first for RecipeEntry::objects (a library's objects
+// in the library's order). Meshes known from `there` or `failed` keep their names, so that a longer list continues with
+// the same objects.
 JobList ListJobs(const std::vector<std::string>& meshes, const Recipe& recipe, const Manifest& there,
                  const std::vector<ObjectFailure>& failed);
 

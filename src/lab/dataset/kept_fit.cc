@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 
 constexpr int64_t kKeptFitEvery = 500;  // steps: about half a minute at 1024²
 
-// What was made, or is being made, in a folder, and for how long.
+// Progress record in the folder: key, state and time.
 struct Progressed {
   std::string key;
   double seconds = 0;
@@ -37,7 +37,7 @@ std::optional<Progressed> ReadProgress(const fs::path& path) {
   try {
     return Progressed{json.at("key"), json.at("seconds"), json.at("train_psnr"), json.at("done")};
   } catch (const nlohmann::json::exception&) {
-    return std::nullopt;  // not ours, or damaged: begin anew
+    return std::nullopt;  // foreign or damaged: starts anew
   }
 }
 
@@ -77,9 +77,9 @@ Result<KeptFit> FitAndKeep(const fs::path& folder, const std::string& key,
   control.checkpoint = folder / "fit.checkpoint";
   control.checkpoint_every = kKeptFitEvery;
   control.resume = true;
-  control.anew_if_unfit = true;  // it is of another version then
+  control.anew_if_unfit = true;  // a mismatch means another version
   control.deliver = [&](const Fitted& fitted) { return WriteCloud(splat, fitted.cloud, {.overwrite = true}); };
-  // Time is noted with every checkpoint, so that a fit in several attempts still says what it took.
+  // Saves the time with every checkpoint, so that it adds up over attempts.
   const double before = progress.seconds;
   Status noted;
   control.observe = [&](const Fitter& fitter) {

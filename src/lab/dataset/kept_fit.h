@@ -12,7 +12,7 @@
 
 namespace anchorsplat {
 
-// What a fit begins with.
+// Input of a fit.
 struct FitTask {
   TrainingViews views;
   GaussianCloud initial;
@@ -21,16 +21,15 @@ struct FitTask {
 
 struct KeptFit {
   GaussianCloud cloud;
-  double seconds = 0;     // of all attempts, what `start` took included
-  double train_psnr = 0;  // dB, over the pictures that it was fitted to
+  double seconds = 0;     // over all attempts, including `start`
+  double train_psnr = 0;  // dB over the fitted pictures
 };
 
-// Of a fit that is kept in `folder`.
+// Path of the splat of a fit kept in `folder`.
 std::filesystem::path KeptSplat(const std::filesystem::path& folder);
 
-// The fit of `start` in a folder of its own: one that was stopped goes on, one that is done is read. `key` says all
-// that its result depends on; what was kept with another key is removed first. `start` is called only where there is
-// something to do, and may keep files of its own in the folder.
+// Runs a fit in a folder of its own, or resumes or reuses it. `key`: everything the result depends on; contents with
+// another key are removed first. `start`: called only if there is work; may keep files of its own in the folder.
 //
 // Errors: kIo: the folder; those of `start` and Fit.
 Result<KeptFit> FitAndKeep(const std::filesystem::path& folder, const std::string& key,

@@ -53,7 +53,7 @@ Status MakeFolder(const fs::path& path) {
   return {};
 }
 
-// An earlier attempt's folder if it was this very job, else a fresh one.
+// Reuses an earlier attempt's folder if it was the same job, else creates a fresh one.
 Status OpenFolder(const ObjectJob& job, const fs::path& folder) {
   const std::string text = ToJsonText(job);
   if (IsFile(folder / kJobName)) {
@@ -70,7 +70,7 @@ Status EnterStage(const fs::path& folder, const std::string& stage) {
   return WriteWholeFile(folder / kStageName, stage, true);
 }
 
-// The mesh as it is seen, and what there is to say about it.
+// Loads the mesh as it will be rendered, and fills the record.
 Result<RayTracer> PrepareMesh(const ObjectJob& job, ObjectRecord& record) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(ImportedMesh imported, ReadMesh(job.source));
   for (const std::string& warning : imported.warnings) LogWarning(Cat(job.source, ": ", warning));
@@ -95,7 +95,7 @@ Status MakeViews(const ObjectJob& job, const fs::path& folder, ObjectRecord& rec
   record.read_seconds = watch.Total();
   ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "views"));
   for (const int size : {job.settings.views.low_size, job.settings.views.high_size}) {
-    ANCHORSPLAT_RETURN_IF_ERROR(Remove(folder / std::to_string(size)));  // of an attempt that was cut off
+    ANCHORSPLAT_RETURN_IF_ERROR(Remove(folder / std::to_string(size)));  // from an interrupted attempt
   }
   ViewSetOptions options = job.settings.views;
   options.overwrite = true;
@@ -111,7 +111,7 @@ Status MakeViews(const ObjectJob& job, const fs::path& folder, ObjectRecord& rec
   return {};
 }
 
-// The views of an object that comes as pictures.
+// Views of an object given as pictures.
 Status CopyViews(const ObjectJob& job, const fs::path& folder, ObjectRecord& record) {
   ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "views"));
   if (job.settings.backdrop) {
@@ -134,7 +134,7 @@ Status CopyViews(const ObjectJob& job, const fs::path& folder, ObjectRecord& rec
 
 double Upscale(const ObjectRecord& record) { return static_cast<double>(record.high_size) / record.low_size; }
 
-// The low-quality splat where readers of the layout look for it, and as PLY.
+// Writes the low-quality splat where readers of the layout expect it, and as PLY.
 Status WriteSplats(const GaussianCloud& cloud, const fs::path& folder, const ObjectRecord& record) {
   ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "files"));
   const int64_t steps = record.settings.fit_steps;
@@ -144,14 +144,14 @@ Status WriteSplats(const GaussianCloud& cloud, const fs::path& folder, const Obj
   return WriteCloud(folder / kSplatName, cloud, {.overwrite = true});
 }
 
-// What the fit gets to see instead of the low views.
+// Writes the project with defects for the fit.
 Status Capture(const ObjectJob& job, const fs::path& folder, const ObjectRecord& record) {
   const ObjectSettings& s = job.settings;
   return WriteCapturedProject(folder / std::to_string(record.low_size), folder / kCapturedName, s.defects,
                               record.background, s.hold_out, s.seed);
 }
 
-// The views that the fit saw, and those that it did not.
+// Opens the views for the fit, training and held-out.
 Result<TrainingViews> FittedViews(const ObjectJob& job, const fs::path& folder, const ObjectRecord& record) {
   const fs::path low = folder / std::to_string(record.low_size);
   const fs::path project = job.settings.defects.Any() ? folder / kCapturedName : low;
@@ -179,7 +179,7 @@ Status FitSplat(const ObjectJob& job, const fs::path& folder, ObjectRecord& reco
   control.checkpoint = folder / kFitCheckpoint;
   control.checkpoint_every = kCheckpointEvery;
   control.resume = true;
-  // A checkpoint of another version of the program is no reason to give the object up.
+  // An unusable checkpoint, such as another version's, must not make the object fail.
   control.anew_if_unfit = true;
   control.deliver = [&](const Fitted& fitted) -> Status {
     if (fitted.report.interrupted) return {};
@@ -198,7 +198,7 @@ Status FitSplat(const ObjectJob& job, const fs::path& folder, ObjectRecord& reco
   return {};
 }
 
-// How well a splat that was not fitted to the views shows them, drawn as its file says.
+// Measures a splat that was not fitted to these views, rendered as its file says.
 Status MeasureDerived(const ObjectJob& job, const fs::path& folder, const GaussianCloud& cloud, ObjectRecord& record) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views, FittedViews(job, folder, record));
   ANCHORSPLAT_ASSIGN_OR_RETURN(FitOptions options, ToFitOptions(job.settings, Upscale(record), record.background));
@@ -212,7 +212,7 @@ Status MeasureDerived(const ObjectJob& job, const fs::path& folder, const Gaussi
   return {};
 }
 
-// A derived object: all of its base's but the splat.
+// Builds a derived object: everything from its base but the splat.
 Status DeriveSplat(const ObjectJob& job, const fs::path& dataset, const fs::path& folder, const fs::path& program,
                    ObjectRecord& record) {
   ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "base"));
@@ -232,7 +232,7 @@ Status DeriveSplat(const ObjectJob& job, const fs::path& dataset, const fs::path
   return WriteSplats(cloud, folder, record);
 }
 
-// What a stage found out, kept beside its files: the record so far.
+// Saves a stage's results: the record so far.
 Status Keep(const fs::path& path, const ObjectRecord& record) {
   return WriteWholeFile(path, ToJson(record).dump(1, ' ', false, Json::error_handler_t::replace) + "\n", true);
 }
@@ -243,8 +243,7 @@ Status Recall(const fs::path& path, ObjectRecord& record) {
   return {};
 }
 
-// Whether the object may have its folder: what is there is no folder of somebody else, and holds nothing that it is
-// made of.
+// Checks that the object may take its folder: it must not belong to anything else, nor contain the object's source.
 Status CheckPlace(const ObjectJob& job, const fs::path& target) {
   std::error_code code;
   const fs::file_status there = fs::symlink_status(target, code);
@@ -258,7 +257,7 @@ Status CheckPlace(const ObjectJob& job, const fs::path& target) {
                                          "data set (it has no ",
                                          kRecordName, ")")};
   }
-  // Also a source that was read by an earlier attempt; a mesh may be an address inside of a library.
+  // Covers sources read by an earlier attempt; a mesh may be an address inside a library.
   const fs::path folder = RealPath(target), source = RealPath(job.source);
   if (std::mismatch(folder.begin(), folder.end(), source.begin(), source.end()).first == folder.end()) {
     return Error{ErrorCode::kBadArgument, Cat(target.string(), ": holds the input ", job.source,
@@ -267,7 +266,7 @@ Status CheckPlace(const ObjectJob& job, const fs::path& target) {
   return CheckHoldsNoInput(target);
 }
 
-// Everything is in the folder: gives it its name, in place of an older object. The job goes last, because a folder
+// Renames the finished folder into place, replacing an older object. Removes the job file last, because a folder
 // without it is begun anew.
 Status Publish(const ObjectJob& job, const fs::path& folder, const fs::path& target) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckPlace(job, target));
@@ -321,12 +320,12 @@ Result<ObjectJob> ReadObjectJob(const fs::path& path) {
 
 namespace {
 
-// Views, and the fit of them.
+// Makes the views and the fit.
 Status MakeObject(const ObjectJob& job, const fs::path& folder, ObjectRecord& record) {
   if (IsFile(folder / kViewsDone)) {
     ANCHORSPLAT_RETURN_IF_ERROR(Recall(folder / kViewsDone, record));
   } else {
-    // Settings that no fit can have are known before the views are made.
+    // Detects impossible settings before rendering views.
     const auto options = ToFitOptions(job.settings, 1, job.settings.views.background);
     if (!options.ok()) return options.error();
     const bool pictures = IsFolder(job.source);
@@ -354,7 +353,7 @@ Result<ObjectRecord> BuildObject(const ObjectJob& job, const fs::path& dataset, 
   const fs::path folder = BuildingFolder(dataset, job.name);
   ANCHORSPLAT_RETURN_IF_ERROR(CheckPlace(job, dataset / job.name));  // before hours of work
   ANCHORSPLAT_RETURN_IF_ERROR(MakeFolder(folder.parent_path()));
-  // A process whose parent was killed may still be on its way out.
+  // Waits for a process whose parent was killed and that is still ending.
   ANCHORSPLAT_ASSIGN_OR_RETURN(const FileLock lock, FileLock::Take(folder.string() + ".lock", true));
   ANCHORSPLAT_RETURN_IF_ERROR(OpenFolder(job, folder));
   ObjectRecord record;
@@ -363,7 +362,7 @@ Result<ObjectRecord> BuildObject(const ObjectJob& job, const fs::path& dataset, 
   record.recipe = job.recipe;
   record.stem = VariantStem(job.name);
   record.settings = job.settings;
-  if (IsFile(folder / kRecordName)) {  // cut off while it got its name
+  if (IsFile(folder / kRecordName)) {  // interrupted while being renamed
     ANCHORSPLAT_RETURN_IF_ERROR(Recall(folder / kRecordName, record));
   } else {
     ANCHORSPLAT_RETURN_IF_ERROR(job.settings.IsDerived() ? DeriveSplat(job, dataset, folder, program, record)

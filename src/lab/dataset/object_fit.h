@@ -10,11 +10,11 @@
 
 namespace anchorsplat {
 
-// The fit that an object's settings ask for. `upscale`: high pixels per low one, along a side; `background`: of its
-// pictures. kBadArgument: what this program's fits cannot do.
+// Fit options for an object's settings. `upscale`: high pixels per low pixel side. `background`: of its pictures.
+// kBadArgument: settings that this program cannot fit.
 Result<FitOptions> ToFitOptions(const ObjectSettings& settings, double upscale, const std::array<float, 3>& background);
 
-// The Gaussians that it begins with. kBadArgument: no points.
+// Its initial Gaussians. kBadArgument: no points.
 Result<GaussianCloud> InitialCloudOf(const ObjectSettings& settings, const FitOptions& options,
                                      const TrainingViews& views);
 

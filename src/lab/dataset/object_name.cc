@@ -17,7 +17,7 @@ namespace {
 bool IsLetterOrDigit(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9'); }
 char Lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
-// What a data set's folder and its .building have besides objects. Compared in small letters, as some file systems do.
+// Names used by a data set's folder and its .building. Case-insensitive, as some file systems are.
 bool IsReserved(const std::string& name) {
   std::string small;
   for (const char c : name) small += Lower(c);
@@ -35,7 +35,7 @@ constexpr std::array<std::string_view, 38> kVariantWords = {
     "medium", "large",  "big",    "tall",   "short",  "long",   "wide",  "low",     "high",  "single",
     "double", "opened", "closed", "open",   "on",     "off",    "new",   "textured"};
 
-// The last word of a name that is written with separators or in camel case; empty when there is but one.
+// Last word of a name with separators or in camel case; empty if there is only one.
 std::string_view LastWord(std::string_view name) {
   for (size_t i = name.size(); i-- > 1;) {
     const bool separated = !IsLetterOrDigit(name[i - 1]);
@@ -50,7 +50,7 @@ std::string_view LastWord(std::string_view name) {
 std::string SafeName(const std::string& text) {
   std::string out;
   for (const char c : text) out += IsLetterOrDigit(c) || c == '.' || c == '_' || c == '-' ? c : '_';
-  while (!out.empty() && out.front() == '.') out.erase(0, 1);  // hidden, "." and ".."
+  while (!out.empty() && out.front() == '.') out.erase(0, 1);  // hidden files, "." and ".."
   return IsReserved(out) ? out + "-object" : out;
 }
 
@@ -58,7 +58,7 @@ uint64_t StableHash(std::string_view text, uint64_t seed) {
   Fingerprint fingerprint(seed * 0x9E3779B97F4A7C15u);
   fingerprint.Add(text);
   uint64_t hash = fingerprint.value();
-  // FNV's high bits hardly depend on the last characters: finish as splitmix64 does.
+  // FNV's high bits depend little on the last characters: finalise like splitmix64.
   hash = (hash ^ (hash >> 30)) * 0xBF58476D1CE4E5B9u;
   hash = (hash ^ (hash >> 27)) * 0x94D049BB133111EBu;
   return hash ^ (hash >> 31);

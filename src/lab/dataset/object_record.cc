@@ -20,7 +20,7 @@ using Json = nlohmann::json;
 
 constexpr uint64_t kMaxManifestBytes = uint64_t{1} << 30;  // a million objects
 
-// File names are bytes; JSON is UTF-8.
+// Serialises a line; file names are bytes, so invalid UTF-8 is replaced.
 std::string Line(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n"; }
 
 Status TakeText(const JsonValue& json, const char* key, std::string& out) {
@@ -43,13 +43,13 @@ Status TakeCount(const JsonValue& json, const char* key, int64_t& out) {
   return {};
 }
 
-// A name that is a folder of the data set and nothing else: manifests may come from anywhere.
+// Whether a name from a manifest is just a folder of the data set: manifests may come from anywhere.
 bool IsFolderName(const std::string& name) {
   return !name.empty() && name != "." && name != ".." && name.find('/') == std::string::npos &&
          name.find('\0') == std::string::npos;
 }
 
-// Calls `take` for every line that is not empty of one of the data set's own lists.
+// Calls `take` for every non-empty line of one of the data set's lists.
 Status ForEachLine(const fs::path& path, const std::function<Status(const JsonValue&)>& take) {
   RecordOwnFile(path);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string text, ReadFileBytes(path, kMaxManifestBytes));
@@ -136,7 +136,7 @@ Result<ObjectRecord> ObjectRecordFrom(const JsonValue& json) {
   r.rejected = rejected.raw().get<bool>();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue settings, json.Get("settings"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(r.settings, ObjectSettingsFrom(settings));
-  // Records of the first builds say these only in the settings.
+  // Records of early versions have these only in the settings.
   const ViewSetOptions& views = r.settings.views;
   r.views = views.rig.views;
   r.low_size = views.low_size;

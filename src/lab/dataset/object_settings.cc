@@ -12,7 +12,7 @@ namespace anchorsplat {
 namespace {
 
 constexpr int64_t kMostInitPoints = 100'000'000;
-constexpr double kMostWhole = 9007199254740992.0;  // 2⁵³: JSON's numbers are doubles
+constexpr double kMostWhole = 9007199254740992.0;  // 2⁵³: largest exact integer in JSON
 
 Status TakeWhole(const JsonValue& json, const char* key, int64_t& out) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue value, json.Get(key));
@@ -43,7 +43,7 @@ Status TakeFlag(const JsonValue& json, const char* key, bool& out) {
   return {};
 }
 
-// The number of the name in `names`.
+// Index of the name in `names`.
 template <size_t count>
 Status TakeNamed(const JsonValue& json, const char* key, const char* const (&names)[count], size_t& out) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue value, json.Get(key));
@@ -60,7 +60,7 @@ Status TakeWord(const JsonValue& json, const char* key, std::string& out) {
   return {};
 }
 
-// 64 bits do not fit into JSON's numbers.
+// Seeds are strings, as JSON numbers cannot hold 64 bits.
 Status TakeSeed(const JsonValue& json, const char* key, uint64_t& out) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue value, json.Get(key));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string text, value.Text());
@@ -115,7 +115,7 @@ Status TakeDefects(const JsonValue& json, PictureDefects& d) {
   return TakeSetting(defects, "defocus", d.defocus);
 }
 
-// What makes kinds; records of earlier versions have none of it.
+// Settings of other kinds of splats; missing in records of earlier versions.
 Status TakeKind(const JsonValue& json, ObjectSettings& s) {
   size_t name = 0;
   if (json.has("init")) {

@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 
 constexpr double kMostPixels = 64;
 
-// Weights of a Gaussian at whole pixels, up to three σ, of sum 1.
+// Gaussian weights at integer pixels up to three σ, with sum 1.
 std::vector<float> BlurWeights(double sigma) {
   const int radius = std::max(1, static_cast<int>(std::ceil(3 * sigma)));
   std::vector<float> weights;
@@ -37,7 +37,7 @@ std::vector<float> BlurWeights(double sigma) {
   return weights;
 }
 
-// Both axes, every channel; what lies beyond the border is as the border is.
+// Separable blur of every channel; replicates the border.
 Image Blurred(const Image& image, double sigma) {
   const std::vector<float> weights = BlurWeights(sigma);
   const int radius = static_cast<int>(weights.size() / 2);
@@ -62,7 +62,7 @@ Image Blurred(const Image& image, double sigma) {
   return out;
 }
 
-// The smallest value in the disc around each pixel; nothing beyond the border counts.
+// Minimum over the disc around each pixel; ignores what is beyond the border.
 Image Eroded(const Image& alpha, double radius) {
   const int reach = static_cast<int>(radius);
   Image out(alpha.width, alpha.height, 1);
@@ -81,7 +81,7 @@ Image Eroded(const Image& alpha, double radius) {
   return out;
 }
 
-// What is left of alpha [1,H,W]; all 1 where the picture has none.
+// The picture's alpha [1,H,W]; all 1 if it has none.
 Image AlphaOf(const Image& picture) {
   Image alpha(picture.width, picture.height, 1);
   for (int64_t i = 0; i < picture.plane(); ++i) alpha.pixels[static_cast<size_t>(i)] = 1;
@@ -89,7 +89,7 @@ Image AlphaOf(const Image& picture) {
   return alpha;
 }
 
-// Of one purpose of one view: what is drawn for one defect changes no other.
+// Random stream for one purpose and view, so that defects do not influence each other.
 Random RandomOf(std::string_view name, std::string_view purpose, uint64_t seed) {
   return Random(StableHash(Cat(purpose, " ", name), seed));
 }
@@ -159,7 +159,7 @@ Camera WithWrongAim(const Camera& camera, const PictureDefects& defects, uint64_
   if (!(defects.pose > 0)) return camera;
   const double phi = 2 * std::numbers::pi * RandomOf(camera.name, "pose", seed).Uniform();
   const double angle = std::atan(defects.pose / camera.intrinsics.fx);
-  // Rodrigues' formula for an axis in the plane of the picture.
+  // Rodrigues' formula for an axis in the picture plane.
   const double x = std::cos(phi), y = std::sin(phi), c = std::cos(angle), s = std::sin(angle);
   const std::array<double, 9> turn = {c + x * x * (1 - c),
                                       x * y * (1 - c),
@@ -189,7 +189,7 @@ Status WriteCapturedProject(const fs::path& low, const fs::path& to, const Pictu
                             const std::array<float, 3>& background, int hold_out, uint64_t seed) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(defects));
   ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet cameras, ReadCameras(low / "sparse" / "0"));
-  // The order in which fits count the views that they hold out.
+  // Order in which fits count held-out views.
   std::stable_sort(cameras.cameras.begin(), cameras.cameras.end(),
                    [](const Camera& a, const Camera& b) { return a.name < b.name; });
   const fs::path images = to / "images", sparse = to / "sparse" / "0";

@@ -11,14 +11,14 @@
 
 namespace anchorsplat {
 
-// What real photographs and their reconstruction have and clean renders have not. Everything 0: none of it. Lengths are
-// pixels of the picture that the defects are done to.
+// Defects of real photographs and their reconstruction that clean renders lack; 0 disables each. Lengths are in pixels
+// of the affected picture.
 struct PictureDefects {
-  double noise = 0;     // σ of every value, of 255
+  double noise = 0;     // σ per value, of 255
   int jpeg = 0;         // quality, 1 to 100, of a baseline JPEG with colours at half the resolution
-  double exposure = 0;  // every picture is brighter or darker by up to this share
-  double pose = 0;      // px by which every camera's aim is off, in a direction of its own
-  double mask = 0;      // px that the mask cuts off all along the outline
+  double exposure = 0;  // maximum relative change of each picture's brightness
+  double pose = 0;      // px by which each camera's aim is off, in a random direction
+  double mask = 0;      // px cut off by the mask along the outline
   double defocus = 0;   // px, σ of the blur
 
   bool InPictures() const { return noise > 0 || jpeg > 0 || exposure > 0 || mask > 0 || defocus > 0; }
@@ -26,29 +26,29 @@ struct PictureDefects {
   friend bool operator==(const PictureDefects&, const PictureDefects&) = default;
 };
 
-// kBadArgument: negative or absurd values: noise above 255, an exposure above 1, blur, cuts and poses above 64 px.
+// kBadArgument: negative or absurd values: noise above 255, exposure above 1, blur, cuts or poses above 64 px.
 Status Validate(const PictureDefects& defects);
 
-// The photograph of `picture` [3 or 4,H,W], 0–1, straight alpha: laid over the background, out of focus, exposed,
-// noisy, compressed, and last cut out by its mask, outside of which is exactly the background again. The mask is where
-// alpha is above 0 after the blur; one that cuts is where alpha, eroded by a disc, is at least ½. Without alpha all is
-// object. The result is [3,H,W]. `name` (of the view) and `seed` alone decide what is random.
+// Simulates a photograph of `picture` [3 or 4,H,W], 0–1, straight alpha: composites over the background, then blurs,
+// exposes, adds noise, compresses, and finally restores the exact background outside the mask. The mask is where alpha
+// is above 0 after the blur or, with `mask` set, where alpha eroded by a disc is at least ½; without alpha, everywhere.
+// Returns [3,H,W]. Randomness depends on `name` (of the view) and `seed` only.
 // Errors: kIo: libjpeg has no memory.
 Result<Image> WithDefects(const Image& picture, const PictureDefects& defects, const std::array<float, 3>& background,
                           std::string_view name, uint64_t seed);
 
-// The camera turned about its own centre until what was in the middle of the picture is `defects.pose` pixels away from
-// it, in a direction that `seed` and the camera's name decide.
+// Rotates the camera about its centre by `defects.pose` pixels at the picture's centre, in a direction that depends on
+// `seed` and the camera's name.
 Camera WithWrongAim(const Camera& camera, const PictureDefects& defects, uint64_t seed);
 
-// The project that a fit is to see instead of `low`, a folder with images/ and sparse/0 as view_set.h writes it: `to`
-// gets defective pictures and wrong poses. Every `hold_out`-th view by name (0: none) is kept as it is, picture and
-// pose, because it tells what the fit is worth; points3D.bin is copied. What is in `to` is replaced.
+// Writes to `to` the project for the fit, with defective pictures and wrong poses, from `low`, a folder with images/
+// and sparse/0 as in view_set.h. Every `hold_out`-th view by name (0: none) stays intact, to evaluate the fit;
+// points3D.bin is copied. Replaces the contents of `to`.
 //
-// Errors: kNotFound, kBadFile, kIo of the pictures and cameras; kBadArgument as Validate.
+// Errors: kNotFound, kBadFile, kIo of pictures and cameras; kBadArgument as Validate.
 Status WriteCapturedProject(const std::filesystem::path& low, const std::filesystem::path& to,
                             const PictureDefects& defects, const std::array<float, 3>& background, int hold_out,
                             uint64_t seed);
-inline constexpr const char* kCapturedName = "captured";  // of that folder, beside the low one
+inline constexpr const char* kCapturedName = "captured";  // name of that folder, beside the low one
 
 }  // namespace anchorsplat

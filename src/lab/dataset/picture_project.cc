@@ -28,7 +28,7 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-// How much of each source pixel lies under target pixel i, when `from` pixels become `to`.
+// Overlap weights of source pixels with target pixel i when `from` pixels become `to`.
 struct Cover {
   int first = 0;
   std::vector<float> weights;  // sum 1
@@ -48,7 +48,7 @@ std::vector<Cover> Covers(int from, int to) {
   return covers;
 }
 
-// One channel, each value times that of `by` (of the same size; null: times 1).
+// Averages one channel, weighted by `by` (same size; null: unweighted).
 void AveragePlane(const Image& image, int channel, const float* by, const std::vector<Cover>& rows,
                   const std::vector<Cover>& columns, float* out) {
   const float* in = image.channel(channel);
@@ -80,7 +80,7 @@ bool SameIntrinsics(const Pinhole& a, const Pinhole& b) {
   return a.width == b.width && a.height == b.height && a.fx == b.fx && a.fy == b.fy && a.cx == b.cx && a.cy == b.cy;
 }
 
-// The cameras of both resolutions: names without folders, pictures as .png.
+// Cameras of both resolutions, with names without folders and pictures as .png.
 struct ProjectCameras {
   CameraSet low, high;
 };
@@ -126,7 +126,7 @@ Status WriteCameras(const fs::path& folder, const CameraSet& cameras, const Writ
   return WriteTransforms(folder / Cat("transforms_", size, ".json"), named, write);
 }
 
-// The high picture is the project's own where it is a PNG that the camera sees as it is, so that no bit changes.
+// Writes both pictures of a view. A project's PNG that needs no undistortion is copied bit by bit.
 Status WritePictures(const Camera& source, const fs::path& high, const fs::path& low, const Pinhole& low_camera,
                      const WriteOptions& write) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewPicture picture, ReadPhotograph(source));

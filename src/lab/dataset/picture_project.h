@@ -9,36 +9,36 @@
 
 namespace anchorsplat {
 
-// A scene that comes as pictures instead of as a mesh: a NeRF-synthetic folder, a COLMAP project such as MVImgNet's, or
-// whatever else fit/training_views.h opens. Its pictures become the high views, the same made smaller the low ones.
+// A scene given as pictures instead of a mesh: a NeRF-synthetic folder, a COLMAP project such as MVImgNet's, or
+// anything that fit/training_views.h opens. Its pictures become the high views; reduced ones become the low views.
 struct PictureProjectOptions {
-  int downscale = 4;                            // high pixels per low one, along a side
-  std::array<float, 3> background = {0, 0, 0};  // where the project does not say which one its pictures have
-  int64_t random_points = 100000;               // initial points of projects that have none
+  int downscale = 4;                            // high pixels per low pixel side
+  std::array<float, 3> background = {0, 0, 0};  // if the project states none
+  int64_t random_points = 100000;               // initial points for projects without points
   uint64_t seed = 0;                            // of those
 };
 
 struct PictureProjectReport {
   int views = 0;
-  int low_size = 0;  // pixels of a picture's width, after which the folders are called
+  int low_size = 0;  // picture width in pixels, after which the folder is named
   int high_size = 0;
   int64_t points = 0;
   std::array<float, 3> background = {0, 0, 0};
   double seconds = 0;
 };
 
-// Fills `folder` as WriteViewSet does (view_set.h), except that the files are called after the project's pictures, and
-// are PNGs whatever those were: copies, where they are PNGs too. NeRF-synthetic scenes give their training views only.
-// When the run is asked to stop (core/run_context.h) it ends between two views (kInterrupted).
+// Fills `folder` like WriteViewSet (view_set.h), with files named after the project's pictures, as PNGs (copies if they
+// already are). NeRF-synthetic scenes provide only their training views. Stops between two views if asked to
+// (core/run_context.h; kInterrupted).
 //
-// Errors: those of OpenProject and ReadImage; kBadArgument: cameras or sizes that differ from view to view (the layout
-// has one camera), pictures too small to be made smaller, views of one name.
+// Errors: those of OpenProject and ReadImage; kBadArgument: cameras or sizes that differ between views (the layout has
+// one camera), pictures too small to reduce, views of equal name.
 Result<PictureProjectReport> WritePictureProject(const std::filesystem::path& project,
                                                  const std::filesystem::path& folder,
                                                  const PictureProjectOptions& options);
 
-// A smaller picture: every pixel is the average of the area it covers, colours weighted by alpha where there is one.
-// Sizes at least 1 and at most the picture's.
+// Reduces a picture: each pixel is the average of the area it covers, with colours weighted by alpha if present.
+// `width` and `height`: at least 1, at most the picture's.
 Image AreaAveraged(const Image& image, int width, int height);
 
 }  // namespace anchorsplat

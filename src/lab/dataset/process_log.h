@@ -5,7 +5,7 @@
 
 namespace anchorsplat {
 
-// The last line of a process's log that says something: its error message. Empty where there is none.
+// The last non-empty line of a process's log, its error message; empty if there is none.
 std::string LastWords(const std::filesystem::path& log);
 
 }  // namespace anchorsplat

@@ -24,7 +24,7 @@ namespace anchorsplat {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr auto kPause = std::chrono::milliseconds(20);  // between looks at processes that run for minutes
+constexpr auto kPause = std::chrono::milliseconds(20);  // polling interval; processes run for minutes
 constexpr double kGraceSeconds = 10;
 
 double SecondsSince(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
@@ -33,7 +33,7 @@ struct Running {
   int64_t index = 0;
   Clock::time_point begin;
   bool timed_out = false;
-  bool asked = false;  // to end
+  bool asked = false;  // SIGTERM was sent
   bool killed = false;
   Clock::time_point asked_at;
 };
@@ -49,7 +49,7 @@ Result<pid_t> Start(const ProcessTask& task) {
   posix_spawn_file_actions_addopen(&files, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, task.log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0666);
   posix_spawn_file_actions_adddup2(&files, STDOUT_FILENO, STDERR_FILENO);
-  // A group of its own; signals as a fresh process has them, whatever the caller does with his.
+  // Own process group, and default signal handling whatever the caller's.
   sigset_t none, defaults;
   sigemptyset(&none);
   sigemptyset(&defaults);
@@ -113,7 +113,7 @@ Status RunProcesses(int64_t count, const std::function<ProcessTask(int64_t)>& ta
         ++it;
         continue;
       }
-      ::kill(-it->first, SIGKILL);  // whatever it has started itself
+      ::kill(-it->first, SIGKILL);  // also ends its own children
       ProcessEnd end;
       end.seconds = SecondsSince(r.begin);
       end.timed_out = r.timed_out;
@@ -142,7 +142,7 @@ std::filesystem::path OwnProgram() {
 void DieWithParent() {
   const pid_t parent = ::getppid();
   ::prctl(PR_SET_PDEATHSIG, SIGTERM);
-  if (::getppid() != parent) ::raise(SIGTERM);  // it went before we could say so
+  if (::getppid() != parent) ::raise(SIGTERM);  // the parent ended before prctl
 }
 
 }  // namespace anchorsplat

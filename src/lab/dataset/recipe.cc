@@ -20,7 +20,7 @@ namespace {
 
 constexpr uint64_t kMaxBytes = uint64_t{1} << 20;
 
-// A value of the file and how to complain about it.
+// A value in the file, with error reporting.
 struct Item {
   const std::string& file;
   std::string key;
@@ -60,7 +60,7 @@ struct Item {
 
 using Take = Status (*)(const Item&, ObjectSettings&);
 
-// Assigns a whole number to a member found by `member`.
+// Assigns an integer to `member`.
 template <auto member>
 Status TakeWhole(const Item& item, ObjectSettings& s) {
   auto& out = member(s);
@@ -191,7 +191,7 @@ const std::map<std::string, Take, std::less<>>& Keys() {
   return keys;
 }
 
-// The settings among the members of `table`; those in `others` are left to the caller.
+// Reads settings from `table`, except the keys in `others`.
 Status TakeSettings(const std::string& file, const toml::table& table, const std::set<std::string_view>& others,
                     ObjectSettings& settings) {
   for (const auto& [key, node] : table) {
@@ -212,11 +212,11 @@ bool IsEntryName(const std::string& name) {
   });
 }
 
-// What is said about an entry besides its settings.
+// Keys of an entry other than settings.
 const std::set<std::string_view> kEntryKeys = {"name", "weight", "objects"};
 const std::set<std::string_view> kDerivedKeys = {"name", "weight", "objects", "from", "after"};
 
-// `earlier`: the entries above it, one of which a derived one is made from.
+// Reads an entry. `earlier`: entries above it, possible bases of a derived one.
 Result<RecipeEntry> TakeEntry(const std::string& file, const toml::table& table, ObjectSettings settings,
                               const std::vector<RecipeEntry>& earlier) {
   const auto complain = [&](const std::string& sentence) {
@@ -267,7 +267,7 @@ Result<RecipeEntry> TakeEntry(const std::string& file, const toml::table& table,
   return entry;
 }
 
-// How many entries an object draws.
+// Reads `draws`.
 Status TakeDraws(const Item& item, Recipe& recipe) {
   if (const auto word = item.node.value_exact<std::string>()) {
     if (*word != "all") return item.Complain("expected a whole number or \"all\"");

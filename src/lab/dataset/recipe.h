@@ -9,31 +9,31 @@
 
 namespace anchorsplat {
 
-// One way to make an object, and how often it is drawn compared with the others.
+// A way to build an object, and its weight in random draws.
 struct RecipeEntry {
   std::string name;  // [A-Za-z0-9._-]+, unique in the recipe
   double weight = 1;
-  int64_t objects = 0;  // only the first so many objects of the list may have it; 0: all
+  int64_t objects = 0;  // only the first N objects of the list may draw it; 0: all
   ObjectSettings settings;
 };
 
-// How a data set's objects are made. A network trained on splats of one schedule and one resolution fails on others, so
-// a recipe mixes several; every object draws its own, by name and seed, whatever else is built beside it.
+// How a data set's objects are built. A network trained on splats of a single schedule and resolution fails on others,
+// so a recipe mixes several. Each object's draw depends only on its name and the seed.
 struct Recipe {
   std::vector<RecipeEntry> entries;  // at least one
-  int draws = 1;                     // entries per object, all different; several make several folders of one model
-  bool draws_all = false;            // instead: every entry that the object may have
+  int draws = 1;                     // distinct entries per object; several give several folders per model
+  bool draws_all = false;            // instead: every entry that the object may draw
   uint64_t seed = 0;
 
-  // Whether folders are called after their entry, too.
+  // Whether folder names include the entry.
   bool NamesEntries() const { return draws_all || draws > 1; }
 };
 
-// All objects with the same settings.
+// A recipe with the same settings for all objects.
 Recipe SingleRecipe(const ObjectSettings& settings);
 
-// A TOML file. Values at the top hold for all entries; each [[mix]] may change them. What is not said is taken from
-// `defaults`.
+// Reads a TOML file. Values at the top apply to all entries, and each [[mix]] may override them. Missing values come
+// from `defaults`.
 //
 //   seed = 7
 //   draws = 1                 # "all": every object gets every entry
@@ -53,14 +53,13 @@ Recipe SingleRecipe(const ObjectSettings& settings);
 //   from = "7k-128"
 //   after = "spz"
 //
-// `from` needs draws = "all" and a fitted entry that no fewer objects have; all settings are that entry's.
+// `from` requires draws = "all" and a fitted entry for at least as many objects, whose settings it takes.
 //
 // Errors: kNotFound, kIo; kBadFile with line: syntax, unknown keys, wrong types, settings that cannot be built.
 Result<Recipe> ReadRecipe(const std::filesystem::path& path, const ObjectSettings& defaults);
 
-// The entries (indices) that object `name`, the `place`-th of the list, from 0, draws: recipe.draws of those it may
-// have, without repetition, each with the probability its weight says; or all of them, in the recipe's order. Fewer, or
-// none, where it may not have as many.
+// The entries (indices) drawn by object `name` at index `place` of the list: recipe.draws distinct ones of those it may
+// have, with probabilities by weight; or all of them in order. Fewer or none if it may not have as many.
 std::vector<size_t> DrawEntries(const Recipe& recipe, const std::string& name, int64_t place = 0);
 
 }  // namespace anchorsplat

@@ -23,11 +23,11 @@ namespace {
 using Point = std::array<float, 3>;
 
 constexpr double kFieldOfView = 75;
-constexpr double kFromFurniture = 0.15, kFromWalls = 0.35;  // metres
-// The window, and how far behind the wall the pane is.
+constexpr double kFromFurniture = 0.15, kFromWalls = 0.35;  // minimum distance of cameras, metres
+// The window, and the depth of its reveal.
 constexpr float kWindowLeft = 1.7f, kWindowRight = 3.5f, kSill = 0.9f, kLintel = 2.2f, kReveal = 0.15f;
 
-// What a panel shows of its picture, in repeats.
+// Part of a picture shown on a panel, in repeats.
 struct Part {
   float u0 = 0, v0 = 0, u1 = 1, v1 = 1;
 };
@@ -49,7 +49,7 @@ class Builder {
     return static_cast<int32_t>(mesh_.materials.size()) - 1;
   }
 
-  // A parallelogram that faces right × up.
+  // Adds a parallelogram with normal right × up.
   void AddPanel(const Point& corner, const Point& right, const Point& up, int32_t material, const Part& part = {}) {
     const uint32_t first = static_cast<uint32_t>(mesh_.positions.size());
     for (const auto& [s, t] : {std::array<float, 2>{0, 0}, {1, 0}, {1, 1}, {0, 1}}) {
@@ -79,7 +79,7 @@ class Builder {
   Mesh& mesh_;
 };
 
-// Everything of `from` behind what `to` has; `to` has all arrays.
+// Appends `from` to `to`, which has all arrays.
 void Append(Mesh from, Mesh& to) {
   const size_t count = from.positions.size();
   from.normals.resize(count, {0, 0, 0});
@@ -154,7 +154,7 @@ void BuildShell(const RoomOptions& options, Builder& build) {
   const int32_t paper = build.AddMaterial("wallpaper", white, WallpaperPicture(seed));
   const int32_t floor = build.AddMaterial("floor", white, WoodFloorPicture(seed + 10));
   const int32_t plaster = build.AddMaterial("ceiling", white, PlasterPicture(seed + 20));
-  constexpr float kPaper = 0.5f, kPlanks = 2.4f;  // metres of a repeat
+  constexpr float kPaper = 0.5f, kPlanks = 2.4f;  // size of a repeat, metres
   build.AddPanel({0, 0, d}, {w, 0, 0}, {0, 0, -d}, floor, {0, 0, w / kPlanks, d / kPlanks});
   build.AddPanel({0, h, 0}, {w, 0, 0}, {0, 0, d}, plaster, {0, 0, w, d});
   build.AddPanel({w, 0, d}, {-w, 0, 0}, {0, h, 0}, paper, {0, 0, w / kPaper, h / kPaper});
@@ -213,7 +213,7 @@ void BuildPictures(const RoomOptions& options, Builder& build) {
   const int32_t painting = build.AddMaterial("landscape", {1, 1, 1}, LandscapePicture(seed + 50));
   const int32_t chart = build.AddMaterial("reading chart", {1, 1, 1}, ReadingChartPicture());
   const int32_t rug = build.AddMaterial("rug", {1, 1, 1}, RugPicture(seed + 60));
-  // On the wall opposite of the window, whose panels run towards smaller x.
+  // On the wall opposite the window, where panels run towards smaller x.
   constexpr float kX = 4.4f, kY = 1.30f, kWide = 1.1f, kHigh = 0.75f, kRim = 0.05f;
   build.AddPanel({kX, kY, d - 0.02f}, {-kWide, 0, 0}, {0, kHigh, 0}, painting);
   build.AddBox({kX - kWide - kRim, kY - kRim, d - 0.045f}, {kX + kRim, kY, d}, wood);
@@ -224,7 +224,7 @@ void BuildPictures(const RoomOptions& options, Builder& build) {
   build.AddPanel({0.5f, 0.008f, 3.0f}, {2.4f, 0, 0}, {0, 0, -1.6f}, rug);
 }
 
-// Two boards on the wall at x = 0 with books on them, spines towards the room.
+// Two shelves of books on the wall at x = 0, spines towards the room.
 void BuildBooks(const RoomOptions& options, Room& room, Builder& build) {
   const int32_t wood = build.AddMaterial("shelf", {0.55f, 0.38f, 0.22f}, std::nullopt);
   const int32_t leaves = build.AddMaterial("leaves", {0.85f, 0.82f, 0.72f}, std::nullopt);
@@ -251,7 +251,7 @@ void BuildBooks(const RoomOptions& options, Room& room, Builder& build) {
   room.furniture.push_back({{0, 1.2f, kFrom}, {kDeep + 0.02f, 2.0f, kTo}});
 }
 
-// Evenly spread numbers in 0–1 (Halton).
+// Halton sequence: evenly spread numbers in 0–1.
 double Spread(int index, int base) {
   double value = 0, digit = 1;
   for (int i = index; i > 0; i /= base) {
@@ -329,7 +329,7 @@ Result<ViewSetCameras> RoomCameras(const Room& room, int count, int low, int hig
   }
   ViewSetCameras cameras;
   const int digits = count > 1000 ? 4 : 3;
-  const int most = 100 * count + 1000;  // places that are tried
+  const int most = 100 * count + 1000;  // attempts
   for (int index = 1, made = 0; made < count; ++index) {
     if (index > most) return Error{ErrorCode::kBadArgument, "the room has no free place for cameras"};
     std::array<double, 3> eye;

@@ -27,7 +27,7 @@ Paint Shade(const Paint& a, float by) { return {a[0] * by, a[1] * by, a[2] * by}
 
 float Step(float edge, float soft, float x) { return std::clamp((x - edge) / soft + 0.5f, 0.0f, 1.0f); }
 
-// Smooth random values that repeat after `across` and `along` cells.
+// Smooth random values, periodic after `across` and `along` cells.
 class Grain {
  public:
   Grain(int across, int along, uint64_t seed)
@@ -35,7 +35,7 @@ class Grain {
     Random random(seed);
     for (float& x : values_) x = static_cast<float>(random.Uniform());
   }
-  float At(float s, float t) const {  // any s, t; 1 is one repeat
+  float At(float s, float t) const {  // any s, t; period 1
     const float x = (s - std::floor(s)) * static_cast<float>(across_);
     const float y = (t - std::floor(t)) * static_cast<float>(along_);
     const int i = static_cast<int>(x), j = static_cast<int>(y);
@@ -53,7 +53,7 @@ class Grain {
   std::vector<float> values_;
 };
 
-// s to the right and t upwards, 0–1.
+// Paints a picture by a function of s (rightwards) and t (upwards), 0–1.
 template <typename Function>
 Texture Painted(const std::string& name, int width, int height, Function&& paint) {
   Texture texture;
@@ -98,7 +98,7 @@ Texture WoodFloorPicture(uint64_t seed) {
   const Grain tone(kRows, 8, seed), fibre(24, 1024, seed + 1), fine(96, 2048, seed + 2), waves(6, 64, seed + 3);
   return Painted("wood floor", 2048, 2048, [&](float s, float t) {
     const float row = std::floor(t * kRows), within = t * kRows - row;
-    // Each row begins somewhere else.
+    // Rows are offset against each other.
     const float shift = static_cast<float>((static_cast<int>(row) * 7) % kRows) / kRows;
     const float along = (s + shift) * kLengths, plank = std::floor(along), end = along - plank;
     const float own = tone.At((row + 0.5f) / kRows, (std::fmod(plank, 2.0f) * 4 + 0.5f) / 8);
@@ -117,7 +117,7 @@ Texture WallpaperPicture(uint64_t seed) {
     Paint color = stripe < 0.5f ? Paint{0.86f, 0.82f, 0.70f} : Paint{0.72f, 0.77f, 0.68f};
     // Hairlines beside each stripe, 1 mm wide.
     if (std::min({std::abs(stripe - 0.04f), std::abs(stripe - 0.46f)}) < 0.008f) color = {0.55f, 0.40f, 0.25f};
-    // Rosettes in every cell of 12.5 cm, moved by half a cell in every second row.
+    // Rosettes in every cell of 12.5 cm, offset by half a cell in every second row.
     const float row = std::floor(t * 4), shift = static_cast<int>(row) % 2 == 0 ? 0.0f : 0.5f;
     const float x = s * 4 + shift - std::floor(s * 4 + shift) - 0.5f, y = t * 4 - row - 0.5f;
     const float radius = std::hypot(x, y), angle = std::atan2(y, x);
@@ -153,7 +153,7 @@ Texture RugPicture(uint64_t seed) {
       if (std::abs(u) + std::abs(v) < 0.2f) color = {0.60f, 0.15f, 0.15f};
       if (std::abs(border - 0.19f) < 0.004f || std::abs(border - 0.02f) < 0.004f) color = {0.90f, 0.85f, 0.70f};
     } else {
-      // Lozenges within lozenges around the middle, and small ones over the whole field.
+      // Nested lozenges around the centre, and small ones all over.
       const float far = std::abs(x - 1.2f) / 1.0f + std::abs(y - 0.8f) / 0.6f;
       const int band = static_cast<int>(far * 14);
       if (far < 1 && band % 3 == 0) color = {0.88f, 0.74f, 0.48f};
@@ -245,7 +245,7 @@ Texture ReadingChartPicture() {
     }
     y += 26 + 2 * scale;
   }
-  // A column of the smallest letters, and lines that come closer and closer.
+  // A column of the smallest letters, and lines with decreasing spacing.
   for (int row = 0; row < 12 && y < 1760; ++row, y += 12) {
     DrawText(image, 90, y,
              Cat("row ", row + 1, ": the quick brown fox jumps over the lazy dog, 0123456789, and on it goes"), 1, ink);
@@ -265,7 +265,7 @@ Texture ReadingChartPicture() {
 }
 
 Texture BookSpinesPicture(uint64_t seed) {
-  constexpr int kLong = 1024, kThick = 64;  // pixels of a spine
+  constexpr int kLong = 1024, kThick = 64;  // of a spine, pixels
   const char* first[] = {"THE HISTORY OF", "A GUIDE TO", "NOTES ON",     "LECTURES ON", "ON",
                          "TRAVELS IN",     "ATLAS OF",   "LETTERS ABOUT"};
   const char* second[] = {"OPTICS",   "GARDENS", "BRIDGES", "THE STARS", "CLOCKS",  "RIVERS",
@@ -293,7 +293,7 @@ Texture BookSpinesPicture(uint64_t seed) {
     const int column = book % (kBookSpines / 2) * kThick, row = book / (kBookSpines / 2) * kLong;
     for (int c = 0; c < 3; ++c) {
       for (int y = 0; y < kThick; ++y) {
-        // Read from top to bottom; darker towards the edges, which are round.
+        // Text runs from top to bottom; spines are rounded, so darker towards the edges.
         const float round = 1 - 0.35f * std::pow(2 * (static_cast<float>(y) + 0.5f) / kThick - 1, 4.0f);
         for (int x = 0; x < kLong; ++x) atlas.at(c, row + x, column + kThick - 1 - y) = round * spine.at(c, y, x);
       }

@@ -25,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kHoldOut = 8;  // gsplat's trainer: where no record says otherwise
+constexpr size_t kHoldOut = 8;  // gsplat's default, if no record says otherwise
 
 std::optional<int64_t> WholeNumber(std::string_view text) {
   int64_t value = 0;
@@ -44,7 +44,7 @@ std::vector<fs::path> Entries(const fs::path& folder) {
   return entries;
 }
 
-// The folders of the lowest and of the highest resolution.
+// Folders of the lowest and the highest resolution.
 std::optional<std::pair<fs::path, fs::path>> Resolutions(const fs::path& folder) {
   std::map<int64_t, fs::path> found;
   for (const fs::path& entry : Entries(folder)) {
@@ -68,7 +68,7 @@ std::optional<int64_t> StepOf(const fs::path& checkpoint) {
 
 Error NotFound(std::string sentence) { return Error{ErrorCode::kNotFound, std::move(sentence)}; }
 
-// Whether the object's splat has a render mode other than the usual one or comments that tell readers something.
+// Whether the object's splat has an unusual render mode or informative comments, which checkpoints cannot store.
 bool SaysMoreThanACheckpoint(const ObjectSettings& s) {
   return s.mode != RenderMode::kClassic || s.mip_filter || s.pixel_area || s.after == "enhanced";
 }
@@ -222,7 +222,7 @@ Result<Image> Scene::Rendered(size_t view) const {
       ANCHORSPLAT_ASSIGN_OR_RETURN(renderer_->tracer, RayTracer::Create(std::move(mesh)));
     }
   }
-  // The rig's own camera: the file's has passed through a quaternion, which costs the last bits.
+  // Uses the rig's camera: the file's went through a quaternion, which costs the last bits.
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewSetCameras cameras, MakeViewSetCameras(record_->settings.views));
   for (const Camera& camera : cameras.high.cameras) {
     if (camera.name == high_views_[view].name) {

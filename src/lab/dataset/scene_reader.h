@@ -21,53 +21,53 @@ namespace anchorsplat {
 struct SceneEntry {
   std::string name;  // of the folder
   std::filesystem::path folder;
-  std::string kind = {};  // the recipe's entry it was made by, as the manifest says; empty where there is none
-  // Pixels a side of its high views instead of the data set's own; 0: those. Only where they are made on demand.
+  std::string kind = {};  // its recipe entry in the manifest; empty if there is none
+  // Side of its high views in pixels, instead of the data set's; 0: unchanged. Only for views rendered on demand.
   int high_size = 0;
 };
 
 struct SceneListOptions {
-  std::string split = {};  // "train", "validation", "test": as splits.json says (dataset_split.h); empty: all
-  bool rejected = false;   // also objects that the manifest marks as rejected
+  std::string split = {};  // "train", "validation" or "test" in splits.json (dataset_split.h); empty: all
+  bool rejected = false;   // includes objects that the manifest marks as rejected
 };
 
-// The objects of a data set, by name: those of manifest.jsonl where there is one, else every folder that looks like an
-// object: one with two folders named after a resolution, as the published data sets have (256/ and 1024/ in 3DGS-SR and
-// MVImgNet, 200/ and 800/ in NeRF-Synthetic), `dataset` itself included.
+// Lists a data set's objects by name: those of manifest.jsonl or, without it, every folder that looks like an object
+// (also `dataset` itself). That is one with two folders named after a resolution, as in published data sets: 256/ and
+// 1024/ in 3DGS-SR and MVImgNet, 200/ and 800/ in NeRF-Synthetic.
 //
-// Errors: kNotFound: no folder, no objects, no splits.json though a split is asked for; kBadFile.
+// Errors: kNotFound: no folder, no objects, or no splits.json for a split; kBadFile.
 Result<std::vector<SceneEntry>> ListScenes(const std::filesystem::path& dataset, const SceneListOptions& options = {});
 
-// A low-quality splat, the low views it was made from, and the high views it should look like. Views are in the order
-// of their pictures' names; view i of both resolutions is seen from the same place. May be used by several threads.
+// A low-quality splat, the low views it was fitted to, and the high views it should look like. Views are sorted by
+// picture name; view i of both resolutions has the same pose. Thread-safe.
 class Scene {
  public:
-  // Reads cameras, nothing large. The lowest resolution's sparse/0 gives the poses, the highest one's cameras.txt the
-  // only intrinsics of its pictures, as upstream's loader has it.
-  // Errors: kNotFound, kBadFile, kIo: no resolutions, cameras that cannot be read, more than one high camera;
-  // kBadArgument: another high_size for views that are not made on demand.
+  // Reads cameras only. Poses come from the lowest resolution's sparse/0, the single intrinsics of high pictures from
+  // the highest resolution's cameras.txt, as in upstream's loader.
+  // Errors: kNotFound, kBadFile, kIo: no resolutions, unreadable cameras, more than one high camera; kBadArgument:
+  // high_size for views that are not rendered on demand.
   static Result<Scene> Open(const SceneEntry& entry);
 
   const std::string& name() const { return name_; }
   const std::filesystem::path& low_folder() const { return low_folder_; }
-  // What the splat was fitted to (fit/training_views.h): the low folder or, of an object with defects, captured/.
+  // The project the splat was fitted to (fit/training_views.h): the low folder or, with defects, captured/.
   std::filesystem::path fitted_project() const;
   const std::vector<Camera>& low_views() const { return low_views_; }
   const std::vector<Camera>& high_views() const { return high_views_; }
-  const std::vector<size_t>& held_out() const { return held_out_; }  // views the splat was not trained on
+  const std::vector<size_t>& held_out() const { return held_out_; }  // views not used to fit the splat
   const std::array<float, 3>& background() const { return background_; }
-  const std::optional<ObjectRecord>& record() const { return record_; }  // of data sets we built
+  const std::optional<ObjectRecord>& record() const { return record_; }  // for data sets built by this program
 
-  // The low-quality splat: the checkpoint of gsplat's trainer with the most steps; splat.ply of an object whose splat
-  // says of itself what such a checkpoint has no place for, its render mode or comments.
+  // The low-quality splat: gsplat's checkpoint with the most steps, or splat.ply if the splat has a render mode or
+  // comments, which such checkpoints cannot store.
   Result<GaussianCloud> LowSplat() const;
   Result<std::filesystem::path> LowSplatPath() const;  // its file
 
-  // High views of `size` pixels a side from now on. kBadArgument: they are not made on demand.
+  // Sets the side of high views, pixels. kBadArgument: they are not rendered on demand.
   Status ResizeHighViews(int size);
 
-  // Pictures as they are stored, rgb or rgba; high views that are not stored are rendered, which gives the same bits.
-  // Errors: those of ReadImage; kNotFound: no picture and no mesh to make it from; kBadFile: another size.
+  // Pictures as stored, rgb or rgba. High views that are not stored are rendered, to the same bits.
+  // Errors: those of ReadImage; kNotFound: neither picture nor mesh; kBadFile: wrong size.
   Result<Image> LowPicture(size_t view) const;
   Result<Image> HighPicture(size_t view) const;
 
@@ -81,7 +81,7 @@ class Scene {
   std::vector<size_t> held_out_;
   std::array<float, 3> background_ = {0, 0, 0};
   std::optional<ObjectRecord> record_;
-  // Made when the first picture has to be rendered.
+  // Created when the first picture is rendered.
   struct Renderer {
     std::mutex mutex;
     std::optional<RayTracer> tracer;
@@ -89,6 +89,6 @@ class Scene {
   std::shared_ptr<Renderer> renderer_ = std::make_shared<Renderer>();
 };
 
-inline constexpr const char* kMeshName = "mesh.safetensors";  // of objects whose high views are made on demand
+inline constexpr const char* kMeshName = "mesh.safetensors";  // of objects whose high views are rendered on demand
 
 }  // namespace anchorsplat

@@ -9,7 +9,7 @@
 
 namespace anchorsplat {
 
-// A tetrahedron of four colours, as OBJ and MTL.
+// Writes a tetrahedron of four colours as OBJ and MTL.
 inline std::string WriteTetrahedron(const std::filesystem::path& folder, const std::string& name) {
   std::ofstream mesh(folder / (name + ".obj"));
   mesh << "mtllib " << name << ".mtl\nv 1 1 1\nv 1 -1 -1\nv -1 1 -1\nv -1 -1 1\n";
@@ -23,7 +23,7 @@ inline std::string WriteTetrahedron(const std::filesystem::path& folder, const s
   return (folder / (name + ".obj")).string();
 }
 
-// An object that is made in a second.
+// An object that takes a second to build.
 inline ObjectJob SmallJob(const std::string& mesh, const std::string& name) {
   ObjectJob job;
   job.name = name;

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kListName = "unfinished";  // which objects may not be called (object_name.cc)
+constexpr const char* kListName = "unfinished";  // reserved in object_name.cc
 constexpr uint64_t kMaxListBytes = uint64_t{1} << 28;
 
 }  // namespace

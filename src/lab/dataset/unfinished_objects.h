@@ -9,20 +9,21 @@
 
 namespace anchorsplat {
 
-// Whoever kills a build gets a data set that is whole object by object, and yet not what was asked for. The build keeps
-// a list of what it still has to make beside what it is making: DATASET/.building/unfinished, a name a line.
+// Detects objects missing from a data set whose build was killed. The build lists what is left to do in
+// DATASET/.building/unfinished, one name per line, beside what it is working on.
 
-// Replaces the list; without names the file goes.
+// Replaces the list; removes the file if there are no names.
 Status WriteUnfinished(const std::filesystem::path& dataset, const std::vector<std::string>& names);
 
 struct UnfinishedObject {
   std::string name;
-  bool listed = false;           // the last build was to make it; else only its folder in .building tells
-  std::filesystem::path folder;  // what there is of it; empty: it was not begun
+  bool listed = false;           // in the last build's list; else only its folder in .building exists
+  std::filesystem::path folder;  // partial result; empty: not begun
 };
 
-// By name: what is on the list, and what was begun and is on none, as an earlier build of other objects left it. Not
-// what `failures` knows. Errors: those of ReadFileBytes.
+// By name: listed objects, and those begun but not listed, left by an earlier build of other objects. Excludes
+// `failures`.
+// Errors: those of ReadFileBytes.
 Result<std::vector<UnfinishedObject>> FindUnfinished(const std::filesystem::path& dataset,
                                                      const std::vector<ObjectFailure>& failures);
 

@@ -27,7 +27,7 @@ constexpr const char* kHighTransforms = "transforms_hr.json";
 Error NotFound(std::string sentence) { return Error{ErrorCode::kNotFound, std::move(sentence)}; }
 Error Bad(std::string sentence) { return Error{ErrorCode::kBadFile, std::move(sentence)}; }
 
-// What is in a folder, sorted by name; nothing when it is none.
+// Contents of a folder, sorted by name; empty if it is none.
 std::vector<fs::path> Entries(const fs::path& folder) {
   std::vector<fs::path> entries;
   std::error_code code;
@@ -38,13 +38,13 @@ std::vector<fs::path> Entries(const fs::path& folder) {
   return entries;
 }
 
-// By the names of pictures, extension included, as data sets have them.
+// Sorts by picture name with extension, as data sets do.
 void SortByName(std::vector<Camera>& cameras) {
   const auto key = [](const Camera& camera) { return camera.name + (camera.image.extension().string()); };
   std::stable_sort(cameras.begin(), cameras.end(), [&](const Camera& a, const Camera& b) { return key(a) < key(b); });
 }
 
-// The one splat among the files of a folder.
+// The only splat among a folder's files.
 Result<fs::path> OnlySplat(const fs::path& folder) {
   std::vector<fs::path> found;
   for (const fs::path& entry : Entries(folder)) {
@@ -76,7 +76,7 @@ Status ReadScene(const BenchmarkEntry& entry, BenchmarkObject& object) {
   return {};
 }
 
-// High views whose names are not among the low ones were not trained on.
+// Reads an object in the examples' layout. High views whose names are not among the low ones are held out.
 Status ReadExample(const fs::path& folder, BenchmarkObject& object) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(object.splat, OnlySplat(folder));
   object.low_project = folder / kLowTransforms;

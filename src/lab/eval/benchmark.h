@@ -16,7 +16,7 @@
 
 namespace anchorsplat {
 
-// An object of a benchmark as its folder is found, before anything in it is read.
+// An object of a benchmark, found but not read.
 struct BenchmarkEntry {
   std::string name;  // of the folder
   std::filesystem::path folder;
@@ -24,46 +24,45 @@ struct BenchmarkEntry {
   bool is_capture = false;  // pictures and cameras alone: OpenCapturedObject (eval/capture.h) opens it
 };
 
-// The objects of a benchmark, in order of their names. The folder holds data sets as dataset/scene_reader.h reads them
-// (without the objects that a manifest rejects), or folders of the layout of the repository's examples: a splat,
-// transforms_lr.json and transforms_hr.json with their pictures; or it is one such object itself. `split` takes those
-// of one split of the data set; empty: all.
+// Lists a benchmark's objects by name. `folder` contains data sets as in dataset/scene_reader.h (without rejected
+// objects), or folders in the layout of the repository's examples (a splat, transforms_lr.json and transforms_hr.json
+// with their pictures), or is itself one such object. `split`: only objects of that split; empty: all.
 //
-// Errors: kNotFound: no folder, no objects in it; kBadFile: of the manifest or the splits.
+// Errors: kNotFound: no folder, or no objects in it; kBadFile: of the manifest or the splits.
 Result<std::vector<BenchmarkEntry>> ListBenchmark(const std::filesystem::path& folder, const std::string& split = {});
 
-// Whether a folder has an object of that second layout.
+// Whether a folder is an object in the examples' layout.
 bool HasExampleLayout(const std::filesystem::path& folder);
 
-// What an object gives methods to work with and what their results are measured with.
+// Input of methods for one object, and what their results are compared with.
 struct BenchmarkObject {
   std::string name;
   std::filesystem::path splat;  // file of `low`
   GaussianCloud low;            // the low-quality splat
-  CameraSet low_cameras;        // of low-resolution views, in order of their names; of a capture those of training
-  // Of the views at the low resolution, in their order; empty: all are as those of the first of low_cameras.
+  CameraSet low_cameras;        // of low-resolution views, by name; for captures, of training views only
+  // Intrinsics of each view at low resolution; empty: those of low_cameras' first for all.
   std::vector<Pinhole> low_intrinsics;
-  std::vector<Camera> views;     // of all high-resolution views, in order of their names
+  std::vector<Camera> views;     // all high-resolution views, by name
   std::vector<size_t> held_out;  // views the low-quality fit was not trained on
   std::array<float, 3> background{};
-  // What the low-quality splat was fitted to, with its defects where it has some (Scene::fitted_project):
-  // fit/training_views.h opens it …
+  // The project the low-quality splat was fitted to, including defects (Scene::fitted_project). fit/training_views.h
+  // opens it …
   std::filesystem::path low_project;
-  int hold_out = 0;                                        // … with this, and holds out the same views
-  int downscale = 1;                                       // … and with this
-  CameraPixelRule camera_rule = CameraPixelRule::kMedian;  // how those of training say the pixel size
-  std::filesystem::path mesh;  // what high views without a picture are rendered from; may be empty
-  // The high-resolution picture of a view, rgb or rgba, of its camera's size.
+  int hold_out = 0;                                        // … with this, holding out the same views
+  int downscale = 1;                                       // … and this
+  CameraPixelRule camera_rule = CameraPixelRule::kMedian;  // rule for pixel sizes from training cameras
+  std::filesystem::path mesh;                              // for rendering high views without a picture; may be empty
+  // High-resolution picture of a view, rgb or rgba, of its camera's size.
   std::function<Result<ViewPicture>(size_t view)> picture;
 
-  double upscale() const;               // pixels of a high view per pixel of a low one, along a side
-  Camera LowCamera(size_t view) const;  // the place of view `view` with the intrinsics of the low ones
-  // [3,H,W]: the picture over the background, and where it says nothing.
+  double upscale() const;               // high pixels per low pixel side
+  Camera LowCamera(size_t view) const;  // pose of view `view` with low-resolution intrinsics
+  // [3,H,W]: the picture over the background, with its ignored pixels.
   Result<ViewPicture> Truth(size_t view) const;
 };
 
-// Errors: kNotFound, kBadFile, kIo, naming the file: no splat, cameras that cannot be read, high views of different
-// sizes or smaller than the low ones.
+// Opens an object. Errors: kNotFound, kBadFile, kIo, naming the file: no splat, unreadable cameras, high views of
+// different sizes or smaller than the low ones.
 Result<BenchmarkObject> OpenObject(const BenchmarkEntry& entry);
 
 }  // namespace anchorsplat

@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Of one training picture; nothing to do when an earlier attempt wrote it.
+// Enlarges one training picture, unless an earlier attempt did.
 Status Enlarge(const Camera& camera, const Pinhole& high, const std::array<float, 3>& background,
                const fs::path& file) {
   if (Exists(file)) return {};
@@ -51,7 +51,7 @@ Result<BicubicFit> FitEnlargedPictures(const MethodTask& task, int64_t steps) {
     if (code) return Error{ErrorCode::kIo, Cat(pictures.string(), ": cannot make this folder: ", code.message())};
     for (size_t i = 0; i < views.train.size(); ++i) {
       Camera& camera = views.train[i];
-      // Of a capture every picture has its own camera.
+      // In captures every picture has its own camera.
       const Pinhole large =
           object.low_intrinsics.empty() ? high : Scaled(camera.intrinsics, static_cast<double>(object.downscale));
       const fs::path file = pictures / Cat(i, ".png");
@@ -60,7 +60,7 @@ Result<BicubicFit> FitEnlargedPictures(const MethodTask& task, int64_t steps) {
       camera.photograph = {};
       camera.intrinsics = large;
     }
-    views.held_out.clear();  // they have no enlarged pictures; the evaluation measures
+    views.held_out.clear();  // there are no enlarged pictures of these; the evaluation measures them
     const InitialPoints points = views.points.size() > 0
                                      ? std::move(views.points)
                                      : RandomPointsInView(kRandomPoints, views.train, views.scene_scale, task.seed);
@@ -72,7 +72,7 @@ Result<BicubicFit> FitEnlargedPictures(const MethodTask& task, int64_t steps) {
   };
   ANCHORSPLAT_ASSIGN_OR_RETURN(KeptFit fit, FitAndKeep(task.cache, key, start));
   std::error_code code;
-  fs::remove_all(pictures, code);  // a hundred megabytes that nobody needs again
+  fs::remove_all(pictures, code);  // a hundred megabytes, no longer needed
   return BicubicFit{std::move(fit.cloud), fit.seconds, fit.train_psnr};
 }
 

@@ -11,16 +11,16 @@ namespace anchorsplat {
 
 struct BicubicFit {
   GaussianCloud cloud;
-  double seconds = 0;     // enlarging and fitting, all attempts together
-  double train_psnr = 0;  // dB, against the enlarged pictures
+  double seconds = 0;     // enlarging and fitting, over all attempts
+  double train_psnr = 0;  // dB against the enlarged pictures
 };
 
-// "Bicubic Optimization" of the paper: a 3DGS fit from scratch at the high resolution, on the low-resolution training
-// pictures enlarged by cubic convolution and rounded to 8 bits. It begins at the points that the project has, else at
-// random ones in view, and holds out the views that the low-quality fit held out.
+// The paper's "Bicubic Optimization": a 3DGS fit from scratch at high resolution to the low-resolution training
+// pictures, enlarged bicubically and rounded to 8 bits. Starts from the project's points, else from random ones in
+// view. Holds out the same views as the low-quality fit.
 //
-// It takes long, so everything stays in `task.cache`: a fit that was stopped, however hard, goes on from its last
-// checkpoint, and one that is done is only read. Errors: those of fit/fit.h; kIo.
+// Slow, so everything is kept in `task.cache`: an interrupted fit resumes from its last checkpoint, a finished one is
+// reused. Errors: those of fit/fit.h; kIo.
 Result<BicubicFit> FitEnlargedPictures(const MethodTask& task, int64_t steps);
 
 }  // namespace anchorsplat

@@ -13,7 +13,7 @@ namespace anchorsplat {
 // cameras. Folders of the layout of the repository's examples have a splat and are no captures, but objects all the
 // same.
 //
-// Errors: kNotFound: no folder, nothing in it.
+// Errors: kNotFound: no folder, or nothing in it.
 Result<std::vector<BenchmarkEntry>> ListCaptures(const std::filesystem::path& folder);
 
 // The object that the recipe makes of a capture (dataset/capture.h). The fit is made here where `fit_folder` does not

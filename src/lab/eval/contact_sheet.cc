@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kTileSide = 256;  // pixels that an excerpt may take
+constexpr int kTileSide = 256;  // maximum side of an excerpt, pixels
 constexpr int kGap = 8;
 constexpr int kTextScale = 2;
 constexpr int kLine = (kCapitalHeight + 4) * kTextScale;
@@ -31,7 +31,7 @@ void Fill(Image& canvas) {
   }
 }
 
-// Every pixel as a square, so that the excerpt shows what was rendered; larger ones are thinned.
+// Draws every pixel as a square, to show exactly what was rendered; subsamples larger excerpts.
 void Paste(Image& canvas, const Image& tile, int left, int top) {
   const int longest = std::max(tile.width, tile.height);
   const int side = longest <= kTileSide ? longest * (kTileSide / longest) : kTileSide;
@@ -46,13 +46,12 @@ void Paste(Image& canvas, const Image& tile, int left, int top) {
   }
 }
 
-// As much of a text as fits into a column.
+// Truncates a text to the column's width.
 std::string Fitting(const std::string& text) { return TruncatedText(text, kTileSide, kTextScale, ""); }
 
-// Whose the objects are, in lines of at most `width` pixels: each text once, with the names of its objects where there
-// are several.
+// Credits in lines of at most `width` pixels: each text once, with its objects' names if there are several objects.
 std::vector<std::string> CreditLines(const Evaluation& evaluation, const std::vector<size_t>& rows, int width) {
-  std::vector<std::pair<std::string, std::string>> credits;  // and whose
+  std::vector<std::pair<std::string, std::string>> credits;  // text, names
   for (const size_t row : rows) {
     for (const std::string& credit : evaluation.credits[row]) {
       const auto same = std::ranges::find(credits, credit, &std::pair<std::string, std::string>::first);
@@ -80,7 +79,7 @@ Result<Image> ContactSheet(const fs::path& out, const Evaluation& evaluation) {
     if (std::any_of(evaluation.results.begin(), evaluation.results.end(), measured)) with_results.push_back(i);
   }
   if (with_results.empty()) return Image();
-  const std::vector<size_t> rows = Thinned(with_results, kMostSheetObjects);
+  const std::vector<size_t> rows = SubsampleEvenly(with_results, kMostSheetObjects);
   const int columns = static_cast<int>(evaluation.methods.size()) + 1;
   const int row_height = kTileSide + 2 * kLine + kGap;
   const int width = kGap + columns * (kTileSide + kGap);

@@ -8,10 +8,11 @@
 
 namespace anchorsplat {
 
-// A row per object, a column per method and the truth last: the excerpts that Evaluate kept in `out`, enlarged by whole
-// multiples, with the object's PSNR below, and below all whose the objects are (Evaluation::credits). At most
-// kMostSheetObjects objects, evenly spread; those without results are left out. An empty image when there are none.
-// Errors: kBadFile, kIo for excerpts that cannot be read.
+// A sheet with a row per object, a column per method and the truth last. Shows the excerpts that Evaluate wrote to
+// `out`, enlarged by integer factors, with the object's PSNR below, and at the bottom the credits
+// (Evaluation::credits). At most kMostSheetObjects objects, evenly chosen; those without results are left out. Empty
+// image if there are none.
+// Errors: kBadFile, kIo: unreadable excerpts.
 inline constexpr size_t kMostSheetObjects = 40;
 Result<Image> ContactSheet(const std::filesystem::path& out, const Evaluation& evaluation);
 

@@ -25,9 +25,9 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-constexpr double kCrop = 0.125;  // width of the part that is shown, of the view's
+constexpr double kCrop = 0.125;  // side of the excerpt relative to the view's width
 
-// Adds the time of its life to a sum.
+// Adds its lifetime to a sum.
 class Timed {
  public:
   explicit Timed(double& sum) : sum_(sum) {}
@@ -40,7 +40,7 @@ class Timed {
   Clock::time_point begin_ = Clock::now();
 };
 
-// All that a result depends on. What the program itself computes changes with its version.
+// Everything a result depends on. Covers the program's own computation by its version.
 std::string Key(const BenchmarkObject& object, const EvalMethod& method, const std::vector<size_t>& views,
                 const EvaluationOptions& options) {
   return Cat("anchorsplat ", ANCHORSPLAT_VERSION, "; ", ProtocolName(options.protocol), ", ", views.size(), " views; ",
@@ -48,7 +48,7 @@ std::string Key(const BenchmarkObject& object, const EvalMethod& method, const s
              options.lpips == nullptr ? "none" : LpipsNetName(options.lpips->net()), "; ", ObjectState(object, views));
 }
 
-// The part that the contact sheet shows: of the middle view, where the low-quality splat is farthest off.
+// The excerpt for the contact sheet: from the middle view, where the low-quality splat differs most.
 struct Excerpt {
   size_t view = 0;
   ViewRegion region;
@@ -67,7 +67,7 @@ Result<Excerpt> ChooseExcerpt(const BenchmarkObject& object, std::span<const siz
   return excerpt;
 }
 
-// A method at work on an object.
+// A method being measured on an object.
 struct Pending {
   const EvalMethod* method = nullptr;
   std::string key;
@@ -76,7 +76,7 @@ struct Pending {
   std::optional<std::string> failure;
 };
 
-// Measures one view of every pending method.
+// Measures one view for every pending method.
 Status MeasureView(const BenchmarkObject& object, size_t view, const std::optional<Excerpt>& excerpt,
                    const fs::path& folder, const EvaluationOptions& options, std::vector<Pending>& pending,
                    EvaluationTimes& times) {
@@ -110,7 +110,7 @@ Status MeasureView(const BenchmarkObject& object, size_t view, const std::option
         ANCHORSPLAT_ASSIGN_OR_RETURN(const MaskedQuality quality, MeasureMasked(*image, truth, picture->ignored));
         score.psnr = quality.psnr;
         score.ssim = quality.ssim;
-        if (quality.counted == 0) return {};  // the mask leaves nothing of it
+        if (quality.counted == 0) return {};  // fully masked
       }
       if (options.lpips != nullptr) {
         const Timed timed(times.lpips);
@@ -127,7 +127,7 @@ Status MeasureView(const BenchmarkObject& object, size_t view, const std::option
   return {};
 }
 
-// What a method makes of the object, to be measured.
+// Runs a method on the object, ready to be measured.
 Pending Prepare(const EvalMethod& method, const MethodTask& task, std::string key) {
   Pending p;
   p.method = &method;
@@ -146,8 +146,7 @@ Pending Prepare(const EvalMethod& method, const MethodTask& task, std::string ke
   return p;
 }
 
-// Measures those that are prepared, all on one view after the other, and keeps their results. An error is one of the
-// object itself.
+// Measures the prepared methods together, view by view, and stores their results. Errors concern the object.
 Status MeasureAndKeep(const MethodTask& task, const std::string& place, const fs::path& folder,
                       const EvaluationOptions& options, std::vector<Pending> pending, std::vector<MethodResult>& done,
                       Evaluation& evaluation) {
@@ -161,7 +160,7 @@ Status MeasureAndKeep(const MethodTask& task, const std::string& place, const fs
       progress.Advance();
     }
   }
-  // Results that are known stay so when the truth of a view turns out to be broken.
+  // Keeps known results even if a view's truth turns out to be broken.
   for (Pending& p : pending) {
     if (!p.failure && measured.ok() && p.result.views.empty()) p.failure = "the masks leave nothing of any view";
     if (p.failure) {
@@ -174,7 +173,7 @@ Status MeasureAndKeep(const MethodTask& task, const std::string& place, const fs
   return measured;
 }
 
-// All that is still to be measured on one object. An error is one of the object itself.
+// Measures what is missing for one object. Errors concern the object.
 Status EvaluateObject(const BenchmarkEntry& entry, const std::string& place, const std::vector<EvalMethod>& methods,
                       const fs::path& out, const EvaluationOptions& options, Evaluation& evaluation) {
   const fs::path folder = ObjectFolder(out, entry.name);
@@ -183,8 +182,8 @@ Status EvaluateObject(const BenchmarkEntry& entry, const std::string& place, con
       entry.is_capture ? OpenCapturedObject(entry, *options.captures, folder / "fit") : OpenObject(entry));
   evaluation.credits.back() = CreditsOf(object.low.comments);
   const std::vector<size_t> views =
-      Thinned(options.protocol == Protocol::kUpstream ? UpstreamViews(object.views.size()) : object.held_out,
-              options.max_views);
+      SubsampleEvenly(options.protocol == Protocol::kUpstream ? UpstreamViews(object.views.size()) : object.held_out,
+                      options.max_views);
   if (views.empty()) return Error{ErrorCode::kBadFile, "every high-resolution view was trained on: none is held out"};
   std::error_code code;
   fs::create_directories(folder, code);
@@ -253,7 +252,7 @@ Result<std::vector<BenchmarkEntry>> ChooseKinds(std::vector<BenchmarkEntry> entr
   return entries;
 }
 
-// `all`: `entries` before kinds were chosen.
+// `all`: the entries before selection by kind.
 Result<std::vector<BenchmarkEntry>> ChooseObjects(std::vector<BenchmarkEntry> entries,
                                                   const std::vector<BenchmarkEntry>& all,
                                                   const EvaluationOptions& options) {

@@ -25,7 +25,7 @@ Result<CameraPixelSizes> TruePixelSizes(const BenchmarkObject& object) {
 double TopOfParabola(std::span<const double> x, std::span<const double> y) {
   const size_t k = static_cast<size_t>(std::max_element(y.begin(), y.end()) - y.begin());
   if (k == 0 || k + 1 == y.size()) return x[k];
-  // Slopes on both sides; where they are s₁ and s₂ the parabola's is linear between the two middles.
+  // Slopes on both sides; a parabola's slope is linear between the two midpoints.
   const double left = (y[k] - y[k - 1]) / (x[k] - x[k - 1]), right = (y[k + 1] - y[k]) / (x[k + 1] - x[k]);
   const double from = (x[k - 1] + x[k]) / 2, to = (x[k] + x[k + 1]) / 2;
   const double top = from + (to - from) * left / (left - right);
@@ -43,7 +43,7 @@ Result<double> BestFilterStrength(const MethodTask& task) {
     candidates.push_back(SplatViews(object, std::move(cloud)));
   }
   std::vector<double> psnr(candidates.size());
-  for (const size_t view : Thinned({task.views.begin(), task.views.end()}, kMostViews)) {
+  for (const size_t view : SubsampleEvenly({task.views.begin(), task.views.end()}, kMostViews)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewPicture truth, object.Truth(view));
     for (size_t k = 0; k < candidates.size(); ++k) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(Image image, candidates[k].render(view));

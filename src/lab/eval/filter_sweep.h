@@ -9,19 +9,19 @@
 
 namespace anchorsplat {
 
-// The strengths that are tried where one is looked for.
+// Strengths tried in a search.
 std::span<const double> FilterStrengths();
 
-// World size of the training pixels of each Gaussian of object.low: the median over the views that hold it, since these
+// Training pixel size of each Gaussian of object.low, world units: the median over the views that contain it, as
 // objects are seen from all around (enhance/pixel_size.h).
 Result<CameraPixelSizes> TruePixelSizes(const BenchmarkObject& object);
 
-// The strength with the best mean PSNR over the task's views (at most twenty of them), between the tried ones by the
-// parabola through the best and its neighbours.
+// The strength with the best mean PSNR over at most twenty of the task's views, interpolated by the parabola through
+// the best tried one and its neighbours.
 Result<double> BestFilterStrength(const MethodTask& task);
 
-// Where the parabola through the largest value and its two neighbours has its top; the largest itself at an end.
-// `x` ascending, as many as `y`, at least one.
+// Position of the maximum of the parabola through the largest value and its neighbours; at an end, the end itself. `x`
+// ascending, as long as `y`, not empty.
 double TopOfParabola(std::span<const double> x, std::span<const double> y);
 
 }  // namespace anchorsplat

@@ -10,9 +10,10 @@
 
 namespace anchorsplat {
 
-// Calls `take` with the object of every line that is not empty, and the line's number, from 1. The file may be gzipped,
-// and has 256 MiB at most. Errors: kNotFound, kIo; kBadFile, naming the line: it is no JSON object, `take` says what is
-// wrong with it, or looks (by an exception of the library) for a property or a type that it has not.
+// Calls `take` with the JSON object and number (from 1) of every non-empty line. The file may be gzipped; at most 256
+// MiB.
+// Errors: kNotFound, kIo; kBadFile naming the line: no JSON object, an error text from `take`, or an exception of the
+// JSON library for a missing property or wrong type.
 Status ForEachJsonLine(const std::filesystem::path& path,
                        const std::function<std::string(const nlohmann::json&, int64_t line)>& take);
 

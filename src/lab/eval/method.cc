@@ -39,9 +39,9 @@ using Clock = std::chrono::steady_clock;
 
 double SecondsSince(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
-// As `enhance` has it for splats that say how they were trained.
+// Default strength as in `enhance`, by the splat's stated render mode.
 double DefaultStrength(const BenchmarkObject& object) {
-  return HasLostNoWidth(object.low) ? 0 : DefaultFilterStrength(object.upscale(), object.low.render_mode);
+  return IsMarkedFullWidth(object.low) ? 0 : DefaultFilterStrength(object.upscale(), object.low.render_mode);
 }
 
 EvalMethod Raw() {
@@ -73,7 +73,7 @@ EvalMethod FilterBest() {
           }};
 }
 
-// What the splat shows at the low resolution, enlarged to the camera's size.
+// Enlarges a low-resolution render to the camera's size.
 using Enlarger = std::function<Result<Image>(const Image&, const Pinhole& high)>;
 
 EvalMethod Enlarged(const std::string& name, const std::string& settings, const Enlarger& enlarge) {
@@ -109,7 +109,7 @@ EvalMethod Bicubic(int64_t steps) {
           }};
 }
 
-// Two states of a file that compare equal are taken for the same file.
+// Identity of a file version; equal texts mean the same file.
 Result<std::string> Identity(const fs::path& path) {
   std::error_code code;
   const auto size = fs::file_size(path, code);
@@ -117,7 +117,7 @@ Result<std::string> Identity(const fs::path& path) {
   return Cat(path.string(), " ", size, " ", fs::last_write_time(path, code).time_since_epoch().count());
 }
 
-// Enlarged by a network that has seen pictures.
+// The method of an upscaling network.
 Result<EvalMethod> Upscaled(const fs::path& file) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string identity, Identity(file));
   ANCHORSPLAT_ASSIGN_OR_RETURN(Upscaler read, Upscaler::Read(file));
@@ -139,7 +139,7 @@ bool IsUpscaler(const fs::path& file) {
   return format != opened->metadata().end() && format->second == kUpscalerFormat;
 }
 
-// What becomes of a network's copies.
+// Text of the settings that choose among a network's copies.
 std::string ChoiceText(const ModelSettings& model) {
   std::string text = Cat(" cost ", kMergeCost, " or ", kMergeCostOfStandard);
   if (model.merge_cost) text = Cat(" cost ", *model.merge_cost);
@@ -150,7 +150,7 @@ std::string ChoiceText(const ModelSettings& model) {
 
 Result<EvalMethod> Model(const fs::path& file) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string identity, Identity(file));
-  const auto network = std::make_shared<std::optional<AnyNetwork>>();  // loaded for the first object
+  const auto network = std::make_shared<std::optional<AnyNetwork>>();  // loaded with the first object
   return EvalMethod{file.stem().string(), Cat(identity, ChoiceText({})),
                     [file, network](const MethodTask& task) -> Result<MethodViews> {
                       if (!*network) {
@@ -181,9 +181,9 @@ Result<EvalMethod> Model(const fs::path& file) {
                     }};
 }
 
-// The low-resolution cameras without those of views that the fit did not see.
+// Low-resolution cameras without held-out views.
 CameraSet TrainingCameras(const BenchmarkObject& object) {
-  if (!object.low_intrinsics.empty()) return object.low_cameras;  // a capture's
+  if (!object.low_intrinsics.empty()) return object.low_cameras;  // captures have only training cameras here
   const auto label = [](const Camera& camera) { return fs::path(camera.name).filename(); };
   std::set<fs::path> held_out;
   for (const size_t view : object.held_out) held_out.insert(label(object.views[view]));
@@ -193,13 +193,13 @@ CameraSet TrainingCameras(const BenchmarkObject& object) {
   return cameras;
 }
 
-// A method of enhance/enhance.h, and what is set for refinement.
+// A method of enhance/enhance.h with options.
 struct NamedMethod {
-  std::string word;  // as the user wrote it
+  std::string word;  // as given by the user
   std::string name;
-  const std::vector<EnhanceMethod>* methods = nullptr;  // of which it is one
-  bool by_default = false;                              // the program chooses, which so comes to `name`
-  std::string quality;                                  // asked of it; empty where it is asked for nothing
+  const std::vector<EnhanceMethod>* methods = nullptr;  // the list it belongs to
+  bool by_default = false;                              // chosen by the program, with `name` as the outcome
+  std::string quality;                                  // requested quality; empty: none
   bool auto_pixel_size =
       false;  // NAME-auto: it gets no cameras, p_LR is read off the splat, as for a user who has the splat alone
   RefineOptions refine;
@@ -209,7 +209,7 @@ struct NamedMethod {
 
   bool TakesPictures() const { return quality == "best" || name.ends_with("refine-images"); }
 
-  // What it depends on besides the object; nothing of it for other methods than refinement.
+  // Everything it depends on besides the object; the refinement part is empty for other methods.
   std::string Settings() const {
     RefineOptions with_pictures = refine;
     if (TakesPictures()) with_pictures.images = "the object's";
@@ -219,8 +219,8 @@ struct NamedMethod {
     if (!upscaler.empty()) settings += Cat(" enlarged with ", upscaler);
     if (refine.seconds) settings += Cat(" ", *refine.seconds, " s");
     if (filter_strength) settings += Cat(" f ", *filter_strength);
-    settings += Cat(" reading ", ReadingModel::ShippedIdentity(), " ");  // which may leave a splat alone
-    // Refinement with pictures begins with a network's result, too.
+    settings += Cat(" reading ", ReadingModel::ShippedIdentity(), " ");  // the reading may leave a splat alone
+    // Refinement with pictures also starts from a network's result.
     if (name.starts_with("model") || name == "refine-images") {
       settings += ShippedNetworkIdentity() + ChoiceText(model);
     }
@@ -228,7 +228,7 @@ struct NamedMethod {
   }
 };
 
-// f of a filter, as in `word`.
+// Parses the f of a filter in `word`.
 Result<double> ParseStrength(const std::string& word, std::string_view value) {
   double f = 0;
   const char* end = value.data() + value.size();
@@ -238,7 +238,7 @@ Result<double> ParseStrength(const std::string& word, std::string_view value) {
                Cat("--methods ", Printable(word), ": f is a number from 0 to ", kMaxFilterStrength)};
 }
 
-// What chooses among the copies of a network: a cost, or a whole number of at least 1.
+// Parses a setting of the choice among copies: a cost, or an integer of at least 1.
 Result<double> ParseCount(const std::string& word, std::string_view key, std::string_view value) {
   double number = 0;
   const char* end = value.data() + value.size();
@@ -285,7 +285,7 @@ Status SetOption(NamedMethod& method, std::string_view key, std::string_view val
   return {};
 }
 
-// Nothing that is set without an effect.
+// Rejects options without effect.
 Status CheckGiven(const NamedMethod& method, const std::set<std::string>& keys) {
   EnhanceOptions options;
   options.methods = method.methods;
@@ -300,7 +300,7 @@ Status CheckGiven(const NamedMethod& method, const std::set<std::string>& keys) 
 
 constexpr std::string_view kAuto = "-auto";
 
-// NAME, NAME-auto or either with @KEY=VALUE@KEY=VALUE…; nothing when there is no such method.
+// Parses NAME or NAME-auto, optionally with @KEY=VALUE@KEY=VALUE…; unset if there is no such method.
 Result<std::optional<NamedMethod>> ParseNamed(const std::string& word, const std::vector<EnhanceMethod>& methods) {
   NamedMethod method;
   method.methods = &methods;
@@ -311,7 +311,7 @@ Result<std::optional<NamedMethod>> ParseNamed(const std::string& word, const std
     method.auto_pixel_size = true;
     method.name.resize(method.name.size() - kAuto.size());
   }
-  // One, or two with a plus between them.
+  // One name, or two joined by "+".
   const auto known = [&](const std::string& name) {
     return std::ranges::find(methods, name, &EnhanceMethod::name) != methods.end();
   };
@@ -334,7 +334,7 @@ Result<std::optional<NamedMethod>> ParseNamed(const std::string& word, const std
     const std::string option = word.substr(at + 1, end - at - 1);
     const size_t equals = option.find('=');
     std::string key = option.substr(0, equals);
-    if (key == "most-gaussians") key = "max-gaussians";  // its old name
+    if (key == "most-gaussians") key = "max-gaussians";  // former name
     if (equals == std::string::npos || !keys.insert(key).second) {
       return Error{ErrorCode::kBadArgument,
                    Cat("--methods ", Printable(word), ": options are written @KEY=VALUE, each once; of f, ",
@@ -351,7 +351,7 @@ Result<std::optional<NamedMethod>> ParseNamed(const std::string& word, const std
   return std::optional<NamedMethod>(std::move(method));
 }
 
-// Of all threads, seconds.
+// Processor seconds of all threads.
 double ProcessorSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 bool ChosenByItself(const NamedMethod& method) {
@@ -366,7 +366,8 @@ EvalMethod Named(const NamedMethod& method) {
             EnhanceOptions options;
             options.methods = method.methods;
             options.method = method.name;
-            // As for a user who has nothing else: where the program takes this method by itself, it may also leave it.
+            // Like a user with nothing but the splat: if the program would choose this method itself, it may also skip
+            // it.
             if (method.by_default || (method.auto_pixel_size && ChosenByItself(method))) options.method = "auto";
             options.quality = method.quality;
             options.upscale = task.object.upscale();
@@ -387,7 +388,7 @@ EvalMethod Named(const NamedMethod& method) {
             MethodViews views = SplatViews(task.object, std::move(enhanced.cloud));
             views.seconds = enhanced.report.seconds;
             for (const StepReport& step : enhanced.report.steps) {
-              // Of "A+B", B's facts are the result's; A's say whose they are.
+              // For "A+B", facts of B keep their names; those of A are prefixed.
               const bool last = &step == &enhanced.report.steps.back();
               for (const auto& [name, value] : step.facts) {
                 views.facts.emplace_back(last ? name : Cat(step.method, "_", name), value);
@@ -403,7 +404,7 @@ EvalMethod Named(const NamedMethod& method) {
           }};
 }
 
-// The word for what a user gets who names no method, or a quality; nothing for others.
+// Parses the words for the program's default choice or a quality; unset for others.
 Result<std::optional<NamedMethod>> ParseDefault(const std::string& word, const std::vector<EnhanceMethod>& methods) {
   if (word != "auto" && word != "fast" && word != "good" && word != "best") return std::optional<NamedMethod>();
   NamedMethod method;
@@ -429,7 +430,7 @@ MethodViews SplatViews(const BenchmarkObject& object, GaussianCloud cloud) {
     ConstantCloud still{cloud};
     Rasterizer rasterizer;
     RenderOptions options;
-    bool warned = false;  // of views with nothing in them: one is enough
+    bool warned = false;  // of an empty view; once is enough
   };
   const auto state = std::make_shared<State>(std::move(cloud));
   state->options.background = object.background;

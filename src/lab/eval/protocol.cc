@@ -10,8 +10,8 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr size_t kUpstreamFirst = 1;  // dropped at the beginning of the names
-constexpr size_t kUpstreamLast = 5;   // dropped at their end
+constexpr size_t kUpstreamFirst = 1;  // dropped at the beginning of the sorted names
+constexpr size_t kUpstreamLast = 5;   // dropped at the end
 constexpr int64_t kPixels = 1 << 16;  // per task
 
 }  // namespace
@@ -38,7 +38,7 @@ std::vector<size_t> HeldOutViews(size_t count) {
   return views;
 }
 
-std::vector<size_t> Thinned(const std::vector<size_t>& views, size_t most) {
+std::vector<size_t> SubsampleEvenly(const std::vector<size_t>& views, size_t most) {
   if (most == 0 || most >= views.size()) return views;
   std::vector<size_t> out;
   for (size_t i = 0; i < most; ++i) out.push_back(views[i * views.size() / most]);

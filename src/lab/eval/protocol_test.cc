@@ -30,10 +30,10 @@ TEST(Protocol, HeldOutIsEveryEighth) {
 
 TEST(Protocol, ThinningSpreads) {
   const std::vector<size_t> views = {0, 8, 16, 24, 32, 40};
-  EXPECT_EQ(Thinned(views, 0), views);
-  EXPECT_EQ(Thinned(views, 9), views);
-  EXPECT_THAT(Thinned(views, 3), ElementsAre(0, 16, 32));
-  EXPECT_THAT(Thinned(views, 4), ElementsAre(0, 8, 24, 32));
+  EXPECT_EQ(SubsampleEvenly(views, 0), views);
+  EXPECT_EQ(SubsampleEvenly(views, 9), views);
+  EXPECT_THAT(SubsampleEvenly(views, 3), ElementsAre(0, 16, 32));
+  EXPECT_THAT(SubsampleEvenly(views, 4), ElementsAre(0, 8, 24, 32));
 }
 
 TEST(Protocol, TruncationKeepsPicturesAndDarkensRenders) {

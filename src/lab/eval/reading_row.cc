@@ -30,7 +30,7 @@
 #include "reading/features.h"
 #include "reading/places.h"
 #include "reading/reading_model.h"
-#include "reading/showing_gaussians.h"
+#include "reading/visible_gaussians.h"
 #include "render/constant_cloud.h"
 #include "render/rasterizer.h"
 #include "render/shown_range.h"
@@ -41,8 +41,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kMostOfName = 200;      // bytes; file systems take 255
-constexpr double kRotationError = 5e-5;  // of an element
+constexpr size_t kMostOfName = 200;      // bytes; file systems allow 255
+constexpr double kRotationError = 5e-5;  // per matrix element
 
 bool IsRotation(const std::array<double, 9>& r) {
   const std::array<double, 4> q = QuaternionFromRotation(r);
@@ -50,13 +50,13 @@ bool IsRotation(const std::array<double, 9>& r) {
   return std::ranges::equal(r, nearest, [](double a, double b) { return std::abs(a - b) < kRotationError; });
 }
 
-// Size and time of its last change; empty where it is none.
+// Size and modification time; empty for a missing file.
 std::string StateOfFile(const fs::path& path) {
   const std::optional<FileVersion> version = VersionOf(path);
   return version ? Cat(" ", version->size, " ", version->changed_s, " ", version->changed_ns) : "";
 }
 
-// How many files are in it and below, their sizes together, and when the last of them changed.
+// Number of files in a folder tree, total size and latest modification time.
 std::string StateOfFolder(const fs::path& folder) {
   int64_t files = 0;
   uint64_t bytes = 0;
@@ -74,11 +74,11 @@ std::string StateOfFolder(const fs::path& folder) {
 }
 
 constexpr uint64_t kMostPlacesOfRow = 1000;
-constexpr double kOnePixel = 2;  // up to which pixels of one splat count as one
+constexpr double kOnePixel = 2;  // ratio up to which the pixels of a splat count as equal
 
 double QuantileOf(Buffer<float> values, double q) { return double{Quantile(values, q)}; }
 
-// Enough of a gain in dB, and of a logarithm. JSON has null for what is not finite.
+// Rounds dB and logarithms to sufficient precision. JSON writes non-finite values as null.
 double Rounded(double value) { return std::round(value * 1e4) / 1e4; }
 
 }  // namespace
@@ -166,13 +166,13 @@ Result<std::vector<ReadingTask>> ReadReadingTasks(const fs::path& path) {
   return tasks;
 }
 
-// Views that nobody was trained on, with their pictures.
+// An object with its held-out views and pictures.
 struct ReadingRows::Object {
   fs::path folder;
   int downscale = 1;
   double upscale = 4;
   std::array<float, 3> background{};
-  CameraSet low;  // of the pictures that were fitted
+  CameraSet low;  // of the fitted pictures
   struct View {
     Camera camera;
     Image truth;
@@ -211,7 +211,7 @@ Result<const ReadingRows::Object*> ReadingRows::Open(const ReadingTask& task) {
     object->low.cameras = fitted.train;
     object->background = whole.background.value_or(object->background);
     PictureCache pictures(whole.held_out, object->background);
-    for (const size_t i : task.measure ? Thinned(all, most) : std::vector<size_t>()) {
+    for (const size_t i : task.measure ? SubsampleEvenly(all, most) : std::vector<size_t>()) {
       Object::View& view = object->views.emplace_back();
       view.camera = whole.held_out[i];
       ANCHORSPLAT_RETURN_IF_ERROR(pictures.Load(static_cast<int64_t>(i), view.truth, view.ignored));
@@ -222,7 +222,7 @@ Result<const ReadingRows::Object*> ReadingRows::Open(const ReadingTask& task) {
     object->upscale = opened.upscale();
     object->low = opened.low_cameras;
     object->background = opened.background;
-    for (const size_t i : task.measure ? Thinned(opened.held_out, most) : std::vector<size_t>()) {
+    for (const size_t i : task.measure ? SubsampleEvenly(opened.held_out, most) : std::vector<size_t>()) {
       Object::View& view = object->views.emplace_back();
       view.camera = opened.views[i];
       ANCHORSPLAT_ASSIGN_OR_RETURN(ViewPicture truth, opened.Truth(i));
@@ -238,14 +238,14 @@ Result<const ReadingRows::Object*> ReadingRows::Open(const ReadingTask& task) {
 
 namespace {
 
-// What all treatments of a splat are measured with.
+// Measures treatments of a splat.
 struct Measuring {
   std::vector<Camera> cameras;  // in the splat's world
   std::vector<const Image*> truths;
   std::vector<const Buffer<uint8_t>*> ignored;
   std::array<float, 3> background{};
   GaussianCloud context;
-  std::optional<Region> keep;  // from the cloud's origin on
+  std::optional<Region> keep;  // relative to the cloud's origin
   Rasterizer rasterizer;
 
   // Mean PSNR over the views, dB.
@@ -280,7 +280,7 @@ const EnhanceMethod* FindMethod(std::string_view name) {
   return found == AllMethods().end() ? nullptr : &*found;
 }
 
-// What a method of one step makes of the splat at those pixels, told what the splat is.
+// Result of a single-step method for the splat at these pixel sizes and in this mode.
 Result<GaussianCloud> Treat(const EnhanceMethod& method, const GaussianCloud& cloud, const Buffer<float>& pixels,
                             double multiple, double showing, const EnhanceOptions& options) {
   EnhanceInput input;
@@ -288,13 +288,13 @@ Result<GaussianCloud> Treat(const EnhanceMethod& method, const GaussianCloud& cl
   input.pixel_sizes = pixels;
   for (float& size : input.pixel_sizes) size *= static_cast<float>(multiple);
   input.pixel_size = QuantileOf(input.pixel_sizes, 0.5);
-  input.showing = showing;
+  input.visible_share = showing;
   input.filter_strength = DefaultFilterStrength(options.upscale, cloud.render_mode);
   StepReport report;
   return method.run(std::move(input), options, report);
 }
 
-// In which modes a splat may be taken to be: as it is tagged, or in either where it is not.
+// Modes in which a splat may be treated: its tag's, or either without a tag.
 std::vector<RenderMode> ModesOf(const GaussianCloud& cloud) {
   if (cloud.render_mode) return {*cloud.render_mode};
   return {RenderMode::kClassic, RenderMode::kAntialiased};
@@ -332,7 +332,7 @@ nlohmann::json RoundedAll(const std::vector<double>& values) {
   return out;
 }
 
-// Of `count` places of the splat what they look like, and their true pixels.
+// Features and true pixel sizes of `count` places of the splat.
 Result<nlohmann::json> PlacesOf(const GaussianCloud& cloud, const Buffer<float>& pixels, int count) {
   const SplatPlaces places(cloud);
   const int64_t all = places.count(), wanted = std::min<int64_t>(count, all);
@@ -342,7 +342,7 @@ Result<nlohmann::json> PlacesOf(const GaussianCloud& cloud, const Buffer<float>&
     Buffer<float> own;
     for (const int64_t i : rows) own.push_back(pixels[static_cast<size_t>(i)]);
     ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud part, Subset(cloud, rows));
-    const auto features = FeaturesOf(part, FindShowingGaussians(part), /*with_pictures=*/false);
+    const auto features = FeaturesOf(part, FindVisibleGaussians(part), /*with_pictures=*/false);
     if (!features.ok()) continue;
     out.push_back({{"unit", features->unit},
                    {"pixel", QuantileOf(std::move(own), 0.5)},
@@ -351,7 +351,7 @@ Result<nlohmann::json> PlacesOf(const GaussianCloud& cloud, const Buffer<float>&
   return out;
 }
 
-// What the program does with the splat by itself, reading it with that model, as `bench reading --decisions` takes it.
+// The program's own decision with this reading model, in the format of `bench reading --decisions`.
 Status AddDecision(const fs::path& path, const GaussianCloud& cloud, double raw, EnhanceOptions options,
                    Measuring& measuring, nlohmann::json& row) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const TensorFile file, TensorFile::Open(path));
@@ -389,7 +389,7 @@ Result<nlohmann::json> ReadingRows::Make(const ReadingTask& task) {
   if (cloud.render_mode) row["tag"] = NameOf(*cloud.render_mode);
 
   const Stopwatch reading;
-  const ShowingGaussians shown = FindShowingGaussians(cloud);
+  const VisibleGaussians shown = FindVisibleGaussians(cloud);
   const auto features = FeaturesOf(cloud, shown);
   row["seconds_reading"] = Rounded(reading.Total());
   double showing = 1;
@@ -427,11 +427,11 @@ Result<nlohmann::json> ReadingRows::Make(const ReadingTask& task) {
     std::fill(pixels.begin() + task.others_from, pixels.end(), static_cast<float>(task.others_pixel));
   }
   row["upscale"] = object->upscale;
-  // Of what is looked at: a sky is far away, and its pixels are none of the subject's.
+  // Only of visible Gaussians near the centre: a distant sky has other pixels than the subject.
   Buffer<float> seen;
-  for (const int64_t i : shown.rows_of_all) seen.push_back(pixels[static_cast<size_t>(i)]);
+  for (const int64_t i : shown.rows) seen.push_back(pixels[static_cast<size_t>(i)]);
   if (seen.empty()) seen = pixels;
-  // Where something was added to a splat that is not looked at, the finest are the subject's.
+  // If something out of view was added to a splat, the finest pixels are the subject's.
   const double finest = QuantileOf(seen, 0.1), coarsest = QuantileOf(seen, 0.9);
   const bool differ = coarsest > kOnePixel * finest, is_whole = !task.keep && task.others_from == 0;
   const double pixel = differ && !is_whole ? finest : QuantileOf(seen, 0.5);

@@ -19,12 +19,12 @@ bool WasMeasured(const ReadingRow& row, const std::string& method) {
   return HasGains(row) && row.gains.contains({row.TrueMode(), method});
 }
 
-// What a splat is called that was made so: whatever gave it its width, it has it.
+// Class of a provenance: those with full width count as one, whatever the reason.
 std::string_view Word(std::string_view made) {
   return made == "mip" || made == "filtered" || made == "mesh" ? "widened" : made;
 }
 
-bool HasItsWidth(std::string_view made) {
+bool HasFullWidth(std::string_view made) {
   const std::string_view word = Word(made);
   return word == "widened" || word == "enhanced";
 }
@@ -36,7 +36,7 @@ double GainOf(const ReadingRow& row, const ReadingDecision& decision) {
 
 std::string GroupOf(const ReadingRow& row) { return row.edit.empty() ? row.kind : "edit: " + row.edit; }
 
-// What a decider says at all: who says it of some rows only is wrong about the others.
+// What a decider provides at all: if for some rows only, it counts as wrong for the others.
 struct Says {
   bool made = false, intervals = false;
 };
@@ -53,14 +53,14 @@ ReadingScore ScoreGroup(std::span<const ReadingRow> rows, const Decisions& decis
     const ReadingRow& row = rows[i];
     const ReadingDecision& decision = decisions[i];
     seconds.push_back(static_cast<float>(decision.seconds));
-    // What a file says of itself nobody has to recognise.
+    // Tagged files need no recognition.
     if (says.made && !row.made.empty() && !row.tag) {
       const std::string_view said = Word(decision.made);
       ++score.named;
       if (said == Word(row.made)) ++score.recognised;
-      if (!HasItsWidth(row.made)) {
+      if (!HasFullWidth(row.made)) {
         ++score.could_be_accused;
-        if (HasItsWidth(said)) ++score.accused;
+        if (HasFullWidth(said)) ++score.accused;
       }
     }
     if (!HasGains(row)) continue;
@@ -150,13 +150,13 @@ Decisions GivenDecisions(std::span<const ReadingRow> rows, const std::map<std::s
   return decisions;
 }
 
-Decisions ReadDecisions(std::span<const ReadingRow> rows, std::span<const ReadingModel> models, double losses_count) {
+Decisions ReadDecisions(std::span<const ReadingRow> rows, std::span<const ReadingModel> models, double loss_weight) {
   Decisions decisions;
   for (const ReadingRow& row : rows) {
     ReadingDecision& decision = decisions.emplace_back();
     if (row.features.values.empty()) continue;
     const Reading reading = ReadFrom(row.features, models[static_cast<size_t>(row.fold) % models.size()]);
-    const Treatment treatment = Treat(reading, {.mode = row.tag, .losses_count = losses_count});
+    const Treatment treatment = Treat(reading, {.mode = row.tag, .loss_weight = loss_weight});
     decision.low = reading.low;
     decision.high = reading.high;
     decision.made = NameOf(reading.likeliest());
@@ -170,7 +170,7 @@ Decisions ReadDecisions(std::span<const ReadingRow> rows, std::span<const Readin
 
 std::vector<ReadingScore> ScoreReadings(std::span<const ReadingRow> rows, const Decisions& decisions) {
   std::vector<size_t> all;
-  std::map<std::pair<bool, std::string>, std::vector<size_t>> groups;  // edits after kinds
+  std::map<std::pair<bool, std::string>, std::vector<size_t>> groups;  // kinds, then edits
   for (size_t i = 0; i < rows.size(); ++i) {
     all.push_back(i);
     groups[{!rows[i].edit.empty(), GroupOf(rows[i])}].push_back(i);
@@ -202,7 +202,8 @@ std::map<std::string, std::map<std::string, int64_t>> TakenFor(std::span<const R
 CurveError ErrorOfCurves(std::span<const ReadingRow> rows) {
   Buffer<float> errors;
   for (const ReadingRow& row : rows) {
-    // Those that give one pixel at the mode's own strength: what was measured at multiples of the true one.
+    // Only decisions with a single pixel at the mode's default strength: those were measured at multiples of the true
+    // one.
     if (!HasGains(row) || !row.today.gain || row.today.method == "none" || !row.today.one_size) continue;
     ReadingDecision by_curve = row.today;
     by_curve.gain.reset();

@@ -12,53 +12,52 @@
 
 namespace anchorsplat {
 
-// What a decider reaches on rows of the table.
+// Performance of a decider on rows of the table.
 struct ReadingScore {
-  std::string group;                    // of kReadingAll: all rows; else a kind, or an edit of any kind
+  std::string group;                    // kReadingAll, or a kind of splat, or an edit
   int64_t rows = 0;                     // with gains
-  double mean = 0, worst = 0, low = 0;  // gain over the splat as it is, dB; `low`: the 2 % quantile
+  double mean = 0, worst = 0, low = 0;  // gain over the unchanged splat, dB; `low`: the 2 % quantile
   std::string worst_id;
-  double losing = 0;  // share of the rows that lose more than kReadingLoss
-  // Of a decider that says intervals, or how splats were made, at all: rows of which it says nothing are wrong ones.
-  int64_t intervals = 0, held = 0;    // rows with a true pixel, and those whose interval holds it
-  double width = 0;                   // upper ends of the intervals over their lower ones, geometric mean
-  int64_t named = 0, recognised = 0;  // rows without a tag, and those that are taken for what they are
-  int64_t could_be_accused = 0;       // of these: that have lost width
-  int64_t accused = 0;                // and are said to have all of theirs: mip, widened, filtered, enhanced, mesh
+  double losing = 0;  // share of rows that lose more than kReadingLoss
+  // For deciders that give intervals or provenances at all; rows without one count as wrong.
+  int64_t intervals = 0, held = 0;    // rows with a true pixel, and those whose interval contains it
+  double width = 0;                   // upper over lower ends of the intervals, geometric mean
+  int64_t named = 0, recognised = 0;  // rows without a tag, and those whose provenance is recognised
+  int64_t could_be_accused = 0;       // of these, rows that have lost width
+  int64_t accused = 0;                // and are classified as having full width: mip, widened, filtered, enhanced, mesh
   double seconds = 0;                 // median
 };
 inline constexpr double kReadingLoss = 0.1;  // dB
 inline constexpr const char* kReadingAll = "all";
 
-// A decision for every row that has gains, in the order of the rows.
+// A decision for each row that has gains, in row order.
 using Decisions = std::vector<ReadingDecision>;
 
 Decisions TodaysDecisions(std::span<const ReadingRow> rows);
-// The best of all that was measured, leaving the splat alone included: a bound, which no decider reaches.
+// The best of all that was measured, including no change: an upper bound.
 Decisions BestDecisions(std::span<const ReadingRow> rows);
-// The one multiple of the true pixel that is best for all rows in the mean, with that method, in the true mode: what
-// knowing the pixel alone is worth. `multiple`: which it is.
+// Uses the single multiple of the true pixel that is best on average over all rows, with `method` in the true mode: the
+// value of knowing the pixel. `multiple`: receives it.
 Decisions FixedDecisions(std::span<const ReadingRow> rows, const std::string& method, double& multiple);
-// Rows that `given` does not name are left alone.
+// Decisions from `given`; rows not in it are left unchanged.
 Decisions GivenDecisions(std::span<const ReadingRow> rows, const std::map<std::string, ReadingDecision>& given);
 
-// What Read and Treat say of the rows' features, of each by the model of its fold: models[row.fold] (docs/reading.md).
-// `losses_count`: TreatmentRequest::losses_count.
+// Decisions of Read and Treat on the rows' features, each by the model of its fold: models[row.fold] (docs/reading.md).
+// `loss_weight`: TreatmentRequest::loss_weight.
 Decisions ReadDecisions(std::span<const ReadingRow> rows, std::span<const ReadingModel> models,
-                        double losses_count = kLossesCount);
+                        double loss_weight = kLossWeight);
 
-// `decisions[i]` is of rows[i]. All rows first, then kinds of splats that nobody has edited, then edits, each in order
-// of their names. Rows without gains count for seconds and for what they are taken for.
+// Scores `decisions[i]` on rows[i]: first all rows, then unedited splats by kind, then edits, each by name. Rows
+// without gains count for seconds and provenance.
 std::vector<ReadingScore> ScoreReadings(std::span<const ReadingRow> rows, const Decisions& decisions);
 
-// How often splats that were made so, and whose files do not say how they are to be drawn, are taken for what: by
-// ReadingRow::made, then by ReadingDecision::made ("nothing": none is said).
+// Confusion matrix of provenances for splats whose file does not state the render mode: by ReadingRow::made, then by
+// ReadingDecision::made ("nothing": none given).
 std::map<std::string, std::map<std::string, int64_t>> TakenFor(std::span<const ReadingRow> rows,
                                                                const Decisions& decisions);
 
-// How far the gains that curves say are from those that were measured of the same decisions: median and 95 % quantile
-// of the absolute differences over the rows that have both, dB. What a decision that was not measured is worth is known
-// to that.
+// Error of gains taken from curves against gains measured for the same decisions: median and 95 % quantile of absolute
+// differences over rows that have both, dB. This is the accuracy to which unmeasured decisions are known.
 struct CurveError {
   int64_t rows = 0;
   double median = 0, most = 0;

@@ -19,7 +19,7 @@ using nlohmann::json;
 namespace fs = std::filesystem;
 
 constexpr double kMostSeconds = 1e6;
-constexpr double kMostMultiple = 16;  // beyond, all is lost that can be
+constexpr double kMostMultiple = 16;  // beyond, everything is lost
 
 double NumberAt(const json& object, const char* name) {
   const auto found = object.find(name);
@@ -31,7 +31,7 @@ std::string TextAt(const json& object, const char* name) {
   return found == object.end() || found->is_null() ? "" : found->get<std::string>();
 }
 
-// What `today` says in the words of a decision. The names of looks are those of how splats are made, but for "widened".
+// Converts `today` to a decision. Its "looks" are provenances, except "widened".
 ReadingDecision TodaysDecision(const json& today) {
   ReadingDecision decision;
   if (today.contains("error")) {
@@ -64,14 +64,14 @@ ReadingRow RowFrom(const json& object) {
   row.tag = RenderModeNamed(TextAt(object, "tag"));
   row.pixel = NumberAt(object, "pixel");
   if (object.contains("gains")) {
-    // Other types throw.
+    // Wrong types throw.
     for (const auto& [mode_name, methods] : object.at("gains").get_ref<const json::object_t&>()) {
       const std::optional<RenderMode> mode = RenderModeNamed(mode_name);
       if (!mode) continue;
       for (const auto& [method, values] : methods.get_ref<const json::object_t&>()) {
         ReadingGains& gains = row.gains[{*mode, method}];
         for (size_t k = 0; k < gains.size(); ++k) {
-          gains[k] = values.at(k).get<double>();  // of another type, and null: throws
+          gains[k] = values.at(k).get<double>();  // throws for other types and null
         }
       }
     }
@@ -129,7 +129,7 @@ Result<std::vector<ReadingRow>> ReadReadingTable(const fs::path& path) {
 
 namespace {
 
-// What makes a decision one that no row can judge; empty: nothing.
+// Why no row can judge a decision; empty if one can.
 std::string WrongWith(const ReadingDecision& decision, const ReadingRow& row) {
   if (decision.method == "none") return "";
   if (!(decision.pixel > 0) || !std::isfinite(decision.pixel)) return "a treatment needs a pixel, a length above 0";

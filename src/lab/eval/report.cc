@@ -38,7 +38,7 @@ std::string Rule(size_t columns) {
   return rule + "\n";
 }
 
-// A bar or a line break in a name would end the cell, and a control character could command the terminal that shows it.
+// Escapes a table cell: a bar or line break would end it, and control characters could command the terminal.
 std::string Cell(std::string text) {
   std::ranges::replace_if(
       text, [](char c) { return c == '|' || c == '\n' || c == '\r'; }, ' ');
@@ -86,7 +86,7 @@ void AddSummaryTable(const Evaluation& evaluation, const std::vector<MethodSumma
   }
 }
 
-// An object's name without its kind, where that is a column.
+// An object's name without its kind, for tables with a column of kinds.
 std::string WithoutKind(const std::string& object, const std::string& kind) {
   const std::string ending = "--" + kind;
   return object.ends_with(ending) ? object.substr(0, object.size() - ending.size()) : object;
@@ -143,7 +143,7 @@ void AddObjectTable(const Evaluation& evaluation, const std::vector<MethodSummar
   }
 }
 
-// Of the methods that take any.
+// Table of seconds for methods that take any.
 void AddSecondsTable(const Evaluation& evaluation, std::vector<MethodSummary> summaries, std::string& text) {
   std::erase_if(summaries, [](const MethodSummary& s) { return s.seconds <= 0; });
   if (summaries.empty()) return;
@@ -161,7 +161,7 @@ void AddSecondsTable(const Evaluation& evaluation, std::vector<MethodSummary> su
   }
 }
 
-// Quoted where it has to be.
+// Quotes a CSV cell if necessary.
 std::string CsvCell(const std::string& text) {
   if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
   std::string quoted = "\"";

@@ -11,18 +11,18 @@
 
 namespace anchorsplat {
 
-// The tables of an evaluation: all objects, kinds where there are several (`seed` as of Summarise), and object by
-// object. `title` stands above the Markdown.
+// Tables of an evaluation in Markdown under `title`: all objects, kinds if there are several, and each object. `seed`:
+// as for Summarise.
 std::string ToMarkdown(const Evaluation& evaluation, const std::vector<MethodSummary>& summaries,
                        const std::string& title, uint64_t seed = 0);
-// The largest loss of any method on any object against the splat as it is, in one line; empty where raw is missing.
+// One line with the largest loss of any method on any object against the unchanged splat; empty without raw.
 std::string WorstSentence(const Evaluation& evaluation);
-// A line per object and method.
+// One line per object and method.
 std::string ToCsv(const Evaluation& evaluation);
-// Everything, views included. Infinite PSNR is null.
+// Everything including views. Infinite PSNR becomes null.
 nlohmann::json ToJson(const Evaluation& evaluation, const std::vector<MethodSummary>& summaries, uint64_t seed = 0);
 
-// out/table.md, table.csv, results.json and contact_sheet.png; earlier ones are replaced.
+// Writes out/table.md, table.csv, results.json and contact_sheet.png, replacing existing ones.
 Status WriteReports(const std::filesystem::path& out, const Evaluation& evaluation,
                     const std::vector<MethodSummary>& summaries, const std::string& title, uint64_t seed = 0);
 

@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kSamples = 10000;
 
-// Linear between neighbours; `values` sorted.
+// Percentile of sorted `values` by linear interpolation.
 double PercentileOf(const std::vector<double>& values, double q) {
   const double at = q * static_cast<double>(values.size() - 1);
   const size_t below = static_cast<size_t>(at);
@@ -20,7 +20,7 @@ double PercentileOf(const std::vector<double>& values, double q) {
   return values[below] + (at - static_cast<double>(below)) * (values[above] - values[below]);
 }
 
-// Pairs of results of two methods on the same object.
+// Paired results of two methods.
 struct Gains {
   std::vector<double> values, weights;
   int64_t wins = 0;
@@ -116,14 +116,14 @@ std::optional<WorstObject> WorstOver(const Evaluation& evaluation, const std::st
     const MethodResult* baseline = result.method == method ? evaluation.Find(result.object, over) : nullptr;
     if (baseline == nullptr) continue;
     const double gain = result.MeanPsnr() - baseline->MeanPsnr();
-    // Not the difference of two identical pictures' infinities.
+    // NaN is the difference of two infinities, of identical pictures.
     if (std::isnan(gain) || (worst && gain >= worst->gain)) continue;
     worst = WorstObject{result.object, method, KindOf(evaluation, result.object), over, gain};
   }
   return worst;
 }
 
-// The evaluation of the objects of one kind alone.
+// The evaluation restricted to objects of one kind.
 Evaluation OfKind(const Evaluation& evaluation, const std::string& kind) {
   Evaluation part;
   part.protocol = evaluation.protocol;

@@ -9,64 +9,62 @@
 
 namespace anchorsplat {
 
-// A mean over objects with the middle 95 % of what it would have been with other objects of the same kind: percentiles
-// of 10,000 bootstrap samples, objects drawn with replacement.
+// A mean over objects with its 95 % bootstrap interval: percentiles of 10,000 resamples of the objects with
+// replacement.
 struct Interval {
   double mean = 0;
   double low = 0;
   double high = 0;
 };
 
-// A method's row. Gains and wins compare with another method on the objects that both have results for.
+// A method's row. Gains and wins cover the objects for which both methods have results.
 struct MethodSummary {
   std::string method;
   int64_t objects = 0;
-  Interval psnr;  // dB; infinite when a picture was identical with the truth
+  Interval psnr;  // dB; infinite if a picture was identical to the truth
   Interval ssim;
-  std::optional<Interval> lpips;          // where all of its results have it
+  std::optional<Interval> lpips;          // if all of its results have it
   std::optional<Interval> gain_over_raw;  // dB
   std::optional<Interval> gain_over_filter;
   int64_t compared_with_filter = 0;  // objects
-  int64_t wins_over_filter = 0;      // of them, with a higher PSNR
+  int64_t wins_over_filter = 0;      // of these, with higher PSNR
   double seconds = 0;                // of the method, mean per object
-  double gaussians = 0;              // mean per object; 0: there is no splat
+  double gaussians = 0;              // mean per object; 0: no splat
 };
 
-// One row per method that has results, in the evaluation's order. The protocol decides how pictures are weighed: all
-// alike, or every object alike. The same seed gives the same intervals.
+// One row per method with results, in the evaluation's order. The protocol decides whether pictures or objects weigh
+// equally. Intervals depend only on the data and the seed.
 std::vector<MethodSummary> Summarise(const Evaluation& evaluation, uint64_t seed);
 
-// The object on which a method gained least over another one.
+// The object on which a method gained least over another.
 struct WorstObject {
   std::string object;
   std::string method;
   std::string kind;
-  std::string over;  // "raw", or "filter" where raw was not measured
-  double gain = 0;   // dB, of mean PSNRs; negative: it lost
+  std::string over;  // "raw", or "filter" if raw was not measured
+  double gain = 0;   // dB, of mean PSNRs; negative: a loss
 };
 
-// A method on the objects of one kind.
+// A method's summary on one kind of object.
 struct KindSummary {
   std::string kind;
   MethodSummary summary;
-  std::optional<WorstObject> worst;  // nothing for "raw", and where there is nothing to compare with
+  std::optional<WorstObject> worst;  // unset for "raw", and without a method to compare with
 };
 
-// Kind by kind in the order of their names, method by method as Summarise. Nothing when the objects are of one kind, or
-// nothing says of which.
+// By kind name, then method as in Summarise. Empty if all objects are of one kind or of unknown kind.
 std::vector<KindSummary> SummariseKinds(const Evaluation& evaluation, uint64_t seed);
 
-// Of all methods and objects the least gain over raw; nothing where raw or all else is missing.
+// The least gain over raw of all methods and objects; unset without raw or other methods.
 std::optional<WorstObject> WorstOverRaw(const Evaluation& evaluation);
 
-// Of the object, as `evaluation` has it; empty where nothing says.
+// Kind of an object in `evaluation`; empty if unknown.
 std::string KindOf(const Evaluation& evaluation, const std::string& object);
 
-// Mean of values with weights, and its bootstrap interval. At least one value, weights positive.
+// Weighted mean and its bootstrap interval. At least one value; positive weights.
 Interval BootstrapMean(const std::vector<double>& values, const std::vector<double>& weights, uint64_t seed);
 
-// How far pixel sizes were read off the truth, |read/true − 1|, of the results of "filter-auto": median and 95th
-// percentile over the objects.
+// Error of pixel sizes read by "filter-auto", |read/true − 1|: median and 95th percentile over the objects.
 struct PixelSizeError {
   int64_t objects = 0;
   double median = 0;

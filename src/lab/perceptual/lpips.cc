@@ -23,7 +23,7 @@ Result<const LpipsPlugin*> LoadPlugin(const fs::path& path) {
     return Error{ErrorCode::kNotFound,
                  "LPIPS missing: this program was built without LibTorch (`anchorsplat doctor` says how to get it)"};
   }
-  // Never closed: LibTorch does not survive being unloaded.
+  // Never closed, because LibTorch cannot be unloaded.
   void* library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (library == nullptr) return Error{ErrorCode::kBadFile, Cat("LPIPS missing: ", dlerror())};
   using Entry = const LpipsPlugin* (*)();

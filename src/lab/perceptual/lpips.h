@@ -12,23 +12,23 @@ namespace anchorsplat {
 struct LpipsPlugin;  // perceptual/lpips_plugin.h
 
 // LPIPS, the learned perceptual distance of Zhang et al. 2018 (version 0.1 with heads): 0 for equal pictures, about
-// 0.05–0.1 for renders that look right, larger is worse. Runs on LibTorch, which a plugin beside the program brings in;
-// for losses with gradients there is perceptual/torch/lpips_network.h.
+// 0.05–0.1 for renders that look right, larger is worse. Runs on LibTorch, loaded by a plugin beside the program. For
+// losses with gradients see perceptual/torch/lpips_network.h.
 class Lpips {
  public:
-  // The file of the plugin, which came with the running program (core/companion.h).
+  // File of the plugin that belongs to the running program (core/companion.h).
   static std::filesystem::path PluginPath();
 
-  // Whether it is there and loads, LibTorch with it; the errors are those of Open.
+  // Checks that the plugin and LibTorch load. Errors: those of Open.
   static Status CheckPlugin(const std::filesystem::path& plugin = PluginPath());
 
-  // Errors: kNotFound "LPIPS missing: …" when the program was built without LibTorch; kBadFile for a plugin of another
-  // build; kBadArgument for weights that are not those of their network.
+  // Errors: kNotFound "LPIPS missing: …": the program was built without LibTorch; kBadFile: a plugin of another build;
+  // kBadArgument: weights of another network.
   static Result<Lpips> Open(const LpipsWeights& weights, const std::filesystem::path& plugin = PluginPath());
 
-  // Distance of two pictures with values 0–1 (used as given). Half of the work is saved when `b` is the same picture as
-  // the time before, so the truth goes there. Uses ThreadCount() threads.
-  // kBadArgument: sizes differ, fewer than three channels, pictures too small for the network; kIo: LibTorch failed.
+  // Distance of two pictures with values 0–1 (not clamped). Passing the same `b` as in the previous call saves half the
+  // work, so put the truth there. Uses ThreadCount() threads.
+  // Errors: kBadArgument: different sizes, fewer than three channels, too small for the network; kIo: LibTorch failed.
   Result<double> Distance(const Image& a, const Image& b) const;
 
   LpipsNet net() const { return net_; }
@@ -39,7 +39,7 @@ class Lpips {
 
   LpipsNet net_;
   const LpipsPlugin* plugin_;
-  std::shared_ptr<void> network_;  // the plugin's, freed by it
+  std::shared_ptr<void> network_;  // owned by the plugin, which frees it
 };
 
 }  // namespace anchorsplat

@@ -55,7 +55,7 @@ std::vector<LpipsStep> Vgg() {
     for (int layer = 0; layer < layers; ++layer) {
       steps.push_back(Convolution(index, in, channels, 3, 1, 1, layer + 1 == layers));
       in = channels;
-      index += 2;  // torchvision counts the ReLUs too
+      index += 2;  // torchvision counts ReLUs too
     }
   }
   return steps;
@@ -132,7 +132,7 @@ int SmallestLpipsSide(LpipsNet net) {
     for (const LpipsStep& step : LpipsSteps(net)) {
       if (step.kind == Kind::kFire || side < 1) continue;
       const int room = side + 2 * step.padding - step.kernel;
-      // Pools that may reach over the edge still begin inside, and none of ours is given less than one window.
+      // Pools with `ceil` still start inside, and ours always get at least one window.
       side = room < 0 ? 0 : (room + (step.ceil ? step.stride - 1 : 0)) / step.stride + 1;
     }
     if (side >= 1) return smallest;

@@ -8,8 +8,8 @@
 
 namespace anchorsplat {
 
-// Weights by formula, so that no test needs the trained ones: deviations that keep the features' size from layer to
-// layer, biases of both signs, and heads that are positive as the trained ones are.
+// Synthetic weights for tests: deviations that preserve the magnitude of features, biases of both signs, and positive
+// heads as in the trained networks.
 inline LpipsWeights SyntheticLpipsWeights(LpipsNet net) {
   LpipsWeights weights{net, {}};
   Random random(1000 + static_cast<uint64_t>(net));

@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kFeatures = "features.";
 
-// The entry of that name; a backbone saved as its `features` alone lacks the prefix.
+// Finds a tensor; a backbone saved as its `features` alone lacks the prefix.
 const TensorEntry* FindTensor(const TensorFile& file, const std::string& name) {
   if (const TensorEntry* entry = file.Find(name)) return entry;
   if (!name.starts_with(kFeatures)) return nullptr;

@@ -34,7 +34,7 @@ std::string PercentDecoded(const std::string& text) {
   return out;
 }
 
-// How many folders up from where it starts a relative path leads, at its end ("a/../../b": 1).
+// Number of folders that a relative path leads up in the end ("a/../../b": 1).
 int FoldersUp(const std::string& relative) {
   int up = 0;
   for (const fs::path& part : fs::path(relative).lexically_normal()) up += part == ".." ? 1 : 0;
@@ -48,7 +48,7 @@ std::string WithSlashes(std::string name) {
   return name;
 }
 
-// Refuses names no file has, so that nothing below has to think about them.
+// Longer names are rejected, as no file has them.
 constexpr size_t kLongestName = 4096;
 
 }  // namespace
@@ -56,7 +56,7 @@ constexpr size_t kLongestName = 4096;
 std::string AssetSource::Resolve(const std::string& name) const {
   if (name.empty() || name.size() > kLongestName || name.find('\0') != std::string::npos) return {};
   std::string path = WithSlashes(name);
-  // Material libraries edited by hand have blanks behind names.
+  // Hand-edited material libraries have trailing blanks.
   while (!path.empty() && (path.back() == ' ' || path.back() == '\t' || path.back() == '\r')) path.pop_back();
   const std::string decoded = PercentDecoded(path);
   const auto last = [](const std::string& p) { return p.substr(p.find_last_of('/') + 1); };
@@ -85,7 +85,7 @@ std::string FolderAssets::Find(const std::string& relative) const {
   const fs::path path = folder_ / relative;
   std::error_code error;
   if (IsFile(path)) return path.string();
-  // Letters of the wrong case, in the file's name only. A bound on what a full folder costs.
+  // Retries ignoring the case of the file name. Limits the cost of large folders.
   constexpr int kMostEntries = 100'000;
   const std::string wanted = AsciiLowerCase(path.filename().string());
   int seen = 0;
@@ -112,7 +112,7 @@ ZipAssets::ZipAssets(std::shared_ptr<const ZipReader> archive, std::string folde
 std::string ZipAssets::Find(const std::string& relative) const {
   const std::string path = (fs::path(folder_) / relative).lexically_normal().generic_string();
   const auto found = members_.find(AsciiLowerCase(path));
-  // A name with a slash at the end is a folder.
+  // Names ending in a slash are folders.
   return found == members_.end() || found->second.ends_with('/') ? std::string() : found->second;
 }
 

@@ -11,24 +11,23 @@
 
 namespace anchorsplat {
 
-// Where a mesh file finds the files it names: its material library, its pictures, its buffers. Mesh files come from
-// other people's machines, so names are taken as those people meant them: backslashes are slashes, letters may have
-// the wrong case, %20 may stand for a space, and of "C:\models\wood.png" only wood.png is looked for, beside the mesh.
-// Names may lead to the folder above the mesh's and what is in it ("../textures/wood.png"), no further: a mesh from the
-// network has no business with the rest of the disk.
+// Finds the files that a mesh file names: material library, pictures, buffers. Mesh files come from other people's
+// machines, so names are read as meant: backslashes are slashes, the case may be wrong, %20 may be a space, and for
+// "C:\models\wood.png" only wood.png is searched, beside the mesh. Names may lead to the folder above the mesh's
+// ("../textures/wood.png"), but no further: a downloaded mesh must not reach the rest of the disk.
 class AssetSource {
  public:
   virtual ~AssetSource() = default;
 
-  // The bytes of what `name` means. kNotFound when there is nothing of that name, kBadFile when it is longer than
-  // `max_bytes`, damaged or refused, kIo when the system refuses.
+  // Reads the file that `name` means. kNotFound: there is none; kBadFile: longer than `max_bytes`, damaged or refused;
+  // kIo.
   Result<std::string> Read(const std::string& name, uint64_t max_bytes) const;
   bool Has(const std::string& name) const { return !Resolve(name).empty(); }
-  // True when there is nothing because the name leads further up than the folder above the mesh's.
+  // Whether `name` is not searched because it leads further up than the folder above the mesh's.
   bool Refuses(const std::string& name) const;
 
  protected:
-  // What a relative path with slashes is called in this source, whatever the case of its letters; "" if nothing is.
+  // Actual name of a relative path with slashes, ignoring case; "" if there is none.
   virtual std::string Find(const std::string& relative) const = 0;
   virtual Result<std::string> ReadFound(const std::string& found, uint64_t max_bytes) const = 0;
 
@@ -36,10 +35,10 @@ class AssetSource {
   std::string Resolve(const std::string& name) const;
 };
 
-// What a warning says of names that are refused.
+// Warning text for refused names.
 inline constexpr const char* kRefusal = "not looked for: it leads out of the folder above the mesh's";
 
-// Files in and around a folder ("../textures/wood.png" is followed). Folders, pipes and devices are nothing.
+// Files in a folder and the one above. Folders, pipes and devices count as missing.
 class FolderAssets : public AssetSource {
  public:
   explicit FolderAssets(std::filesystem::path folder) : folder_(std::move(folder)) {}
@@ -52,7 +51,7 @@ class FolderAssets : public AssetSource {
   std::filesystem::path folder_;
 };
 
-// Members of an archive, seen from a folder in it ("" for the top).
+// Members of an archive, relative to a folder in it ("" for the top).
 class ZipAssets : public AssetSource {
  public:
   ZipAssets(std::shared_ptr<const ZipReader> archive, std::string folder);
@@ -64,7 +63,7 @@ class ZipAssets : public AssetSource {
  private:
   std::shared_ptr<const ZipReader> archive_;
   std::string folder_;
-  std::map<std::string, std::string> members_;  // in small letters → as it is
+  std::map<std::string, std::string> members_;  // lower-case name → actual name
 };
 
 }  // namespace anchorsplat

@@ -13,7 +13,7 @@
 
 namespace anchorsplat {
 
-// For tests: files that exist only in memory, and small ones to put there.
+// Files that exist only in memory, and small contents for them.
 
 class MapAssets : public AssetSource {
  public:
@@ -41,7 +41,7 @@ inline std::string Base64(const std::string& bytes) {
   return out;
 }
 
-// An SGI picture, plain: `values` channel by channel, rows from the bottom.
+// An uncompressed SGI picture: `values` channel by channel, rows from the bottom.
 inline std::string SgiBytes(int width, int height, int channels, const std::vector<uint8_t>& values) {
   std::string out(512, '\0');
   const auto put = [&](size_t at, int value) {
@@ -64,7 +64,7 @@ inline std::string GreyPng(float value) {
   return PngBytes(image);
 }
 
-// A triangle as glTF, its buffer and its picture inside.
+// A triangle as glTF with embedded buffer and picture.
 inline std::string TriangleGltf(const std::string& material) {
   std::string buffer;
   const auto put = [&](std::initializer_list<float> values) {

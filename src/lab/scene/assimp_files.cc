@@ -24,7 +24,7 @@ class MemoryStream : public Assimp::IOStream {
   size_t Write(const void*, size_t, size_t) override { return 0; }
   aiReturn Seek(size_t offset, aiOrigin origin) override {
     const size_t base = origin == aiOrigin_SET ? 0 : origin == aiOrigin_CUR ? at_ : bytes_.size();
-    const size_t to = base + offset;  // offsets back from the end wrap around, as the interface has no sign
+    const size_t to = base + offset;  // negative offsets wrap around, as the interface is unsigned
     if (to > bytes_.size()) return aiReturn_FAILURE;
     at_ = to;
     return aiReturn_SUCCESS;
@@ -48,7 +48,7 @@ int64_t BlankLinesAndPoints(std::string& obj) {
     while (first < obj.size() && (obj[first] == ' ' || obj[first] == '\t')) ++first;
     const bool blank = first < obj.size() && (obj[first] == 'l' || obj[first] == 'p');
     const bool element = blank && first + 1 < obj.size() && (obj[first + 1] == ' ' || obj[first + 1] == '\t');
-    // To the end of the line, or of the lines that a backslash at the end joins.
+    // To the end of the line, including lines joined by a backslash.
     size_t end = first;
     for (; end < obj.size(); ++end) {
       if (obj[end] != '\n') continue;

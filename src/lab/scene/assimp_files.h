@@ -9,10 +9,10 @@
 
 namespace anchorsplat {
 
-// The bytes of the file of that name; nothing when there is none.
+// Returns the bytes of a file, or nothing if it does not exist.
 using AssimpFileReader = std::function<std::optional<std::string>(const std::string& name)>;
 
-// Files as assimp opens them, read-only and in memory, so that the same code reads folders and archives.
+// assimp's file interface, read-only and in memory, so that folders and archives are read alike.
 class AssimpFiles : public Assimp::IOSystem {
  public:
   explicit AssimpFiles(AssimpFileReader read) : read_(std::move(read)) {}
@@ -26,10 +26,10 @@ class AssimpFiles : public Assimp::IOSystem {
   AssimpFileReader read_;
 };
 
-// Makes blank what is no face in an OBJ file: line elements (`l`), points (`p`), and the statements whose names begin
-// with these letters, `lod` and `parm`, as assimp 5.2 goes by the letter alone. It refuses files in which such lines
-// refer to vertices in ways it does not expect, and a view shows none of them. Blank, not gone, so that line numbers in
-// messages stay right. Gives the number of line elements and points; lines joined by a backslash are one.
+// Blanks out lines of an OBJ that are no faces: line elements (`l`), points (`p`), and statements that start with these
+// letters (`lod`, `parm`), which assimp 5.2 confuses with them. assimp rejects files where such lines refer to vertices
+// in unexpected ways, and no view shows them. Line numbers stay valid. Returns the number of line elements and points;
+// lines joined by a backslash count once.
 int64_t BlankLinesAndPoints(std::string& obj);
 
 }  // namespace anchorsplat

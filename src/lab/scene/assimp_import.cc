@@ -21,15 +21,15 @@ namespace anchorsplat {
 
 namespace {
 
-// IEC 61966-2-1.
+// sRGB transfer function (IEC 61966-2-1).
 float SrgbFromLinear(float v) { return v <= 0.0031308f ? 12.92f * v : 1.055f * std::pow(v, 1 / 2.4f) - 0.055f; }
 
-// What a material says besides what the scene keeps.
+// Material properties needed only during import.
 struct Materials {
-  std::vector<unsigned> uv_channel;  // for each material, which texture coordinates its picture takes
+  std::vector<unsigned> uv_channel;  // per material, the texture coordinate set of its picture
   bool linear = false;               // factors and vertex colours are linear (glTF)
 
-  // A colour as this project keeps colours; what is not finite becomes 1.
+  // Converts a colour to sRGB; non-finite values become 1.
   std::array<float, 4> ToSrgb(const aiColor4D& color) const {
     std::array<float, 4> out = {UnitOr(color.r, 1), UnitOr(color.g, 1), UnitOr(color.b, 1), UnitOr(color.a, 1)};
     if (linear) std::transform(out.begin(), out.begin() + 3, out.begin(), SrgbFromLinear);
@@ -37,7 +37,7 @@ struct Materials {
   }
 };
 
-// The colour picture's path and texture coordinates; false when the material has none.
+// Path and texture coordinate set of the colour picture; false if the material has none.
 bool ColorPicture(const aiMaterial& material, std::string& path, unsigned& channel) {
   for (const aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}) {
     aiString name;
@@ -87,7 +87,7 @@ EmbeddedPicture ReadPicture(const aiTexture& from) {
   if (from.pcData == nullptr) return picture;
   picture.width = from.mWidth;
   picture.height = from.mHeight;
-  if (from.mHeight == 0) {  // a picture file of mWidth bytes
+  if (from.mHeight == 0) {  // an encoded file of mWidth bytes
     picture.bytes.assign(reinterpret_cast<const char*>(from.pcData), from.mWidth);
     return picture;
   }
@@ -99,13 +99,13 @@ EmbeddedPicture ReadPicture(const aiTexture& from) {
   return picture;
 }
 
-// One mesh of the file at one place of the scene.
+// A mesh placed in the scene.
 struct Instance {
   const aiMesh* mesh;
   aiMatrix4x4 to_world;
 };
 
-// The scene's tree flattened. False when there is more than the limit: a tree of n nodes may hold n² instances.
+// Flattens the node tree. False above the limit: a tree of n nodes may have n² instances.
 bool FlattenTree(const aiScene& scene, int64_t max_vertices, std::vector<Instance>& instances) {
   std::vector<std::pair<const aiNode*, aiMatrix4x4>> open;
   if (scene.mRootNode != nullptr) open.emplace_back(scene.mRootNode, aiMatrix4x4());
@@ -121,14 +121,14 @@ bool FlattenTree(const aiScene& scene, int64_t max_vertices, std::vector<Instanc
       if (vertices > max_vertices || static_cast<int64_t>(instances.size()) > max_vertices) return false;
       instances.push_back({mesh, to_world});
     }
-    for (unsigned i = node->mNumChildren; i-- > 0;) {  // so that children come out in their order
+    for (unsigned i = node->mNumChildren; i-- > 0;) {  // keeps the children's order
       if (node->mChildren[i] != nullptr) open.emplace_back(node->mChildren[i], to_world);
     }
   }
   return true;
 }
 
-// Sizes are known now; cutting polygons into triangles is what may take long.
+// Checks sizes before triangulation, which may take long.
 void CheckSizes(const aiScene& scene, const MeshLimits& limits) {
   int64_t vertices = 0;
   for (unsigned m = 0; m < scene.mNumMeshes; ++m) {
@@ -150,7 +150,7 @@ using Vec3 = std::array<float, 3>;
 
 Vec3 ToArray(const aiVector3D& v) { return {v.x, v.y, v.z}; }
 
-// Normals come in any length, and as NaN where a file's own program divided by zero; zero asks for one of ours.
+// Normalises a normal. Files contain any length, and NaN after divisions by zero; zero requests a computed one.
 Vec3 UnitOrZero(const aiVector3D& v) {
   const double length = std::sqrt(double{v.x} * v.x + double{v.y} * v.y + double{v.z} * v.z);
   if (!(length > 0) || !std::isfinite(length)) return {0, 0, 0};
@@ -163,7 +163,7 @@ bool HasArea(const Vec3& a, const Vec3& b, const Vec3& c) {
   return u[1] * v[2] - u[2] * v[1] != 0 || u[2] * v[0] - u[0] * v[2] != 0 || u[0] * v[1] - u[1] * v[0] != 0;
 }
 
-// All triangles of one instance, appended corner by corner.
+// Appends all triangles of an instance, corner by corner.
 void AppendInstance(const Instance& instance, const Materials& materials, RawScene& out) {
   MeshCorners& corners = out.corners;
   const aiMesh& mesh = *instance.mesh;
@@ -174,7 +174,7 @@ void AppendInstance(const Instance& instance, const Materials& materials, RawSce
   const unsigned channel = materials.uv_channel[static_cast<size_t>(material)];
   const bool with_uvs = channel < AI_MAX_NUMBER_OF_TEXTURECOORDS && mesh.mTextureCoords[channel] != nullptr;
   const aiColor4D* colors = mesh.mColors[0];
-  const bool mirrored = linear.Determinant() < 0;  // keeps the winding that normals are made from
+  const bool mirrored = linear.Determinant() < 0;  // mirroring must not flip the winding
   corners.has_uvs |= with_uvs;
   corners.has_colors |= colors != nullptr;
   out.has_normals &= mesh.mNormals != nullptr;
@@ -222,7 +222,7 @@ RawScene ImportWithAssimp(const AssimpFileReader& read, const std::string& name,
                           const MeshLimits& limits) {
   Assimp::Importer importer;
   importer.SetIOHandler(new AssimpFiles(read));  // owned by the importer
-  // Subdivision surfaces grow with a power of a number in the file; splitting by back faces changes nothing for us.
+  // Subdivision grows with a power of a number in the file; splitting by back faces is not needed.
   importer.SetPropertyBool(AI_CONFIG_IMPORT_AC_EVAL_SUBDIVISION, false);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_AC_SEPARATE_BFCULL, false);
   const aiScene* scene = importer.ReadFile(name, 0);

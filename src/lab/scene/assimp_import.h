@@ -8,10 +8,10 @@
 
 namespace anchorsplat {
 
-// Reads the mesh file `name` by assimp, cut into triangles and with its tree of nodes flattened. `ending` is the
-// file's, in small letters with its dot. To be called in a process that may crash (isolated_process.h): assimp does, on
-// damaged files. Throws std::runtime_error with a sentence without a beginning when assimp refuses the file, it goes
-// over the limits or has no triangle; also whatever assimp throws.
+// Reads the mesh file `name` by assimp, triangulated, with its node tree flattened. `ending`: lower-case extension with
+// dot. Call it in a process that may crash (isolated_process.h): assimp crashes on damaged files. Throws
+// std::runtime_error (a sentence without its beginning) if assimp rejects the file, a limit is exceeded, or there is no
+// triangle; also whatever assimp throws.
 RawScene ImportWithAssimp(const AssimpFileReader& read, const std::string& name, const std::string& ending,
                           const MeshLimits& limits);
 

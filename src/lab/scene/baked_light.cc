@@ -18,9 +18,9 @@ namespace {
 using Place = std::array<float, 3>;
 
 constexpr size_t kMostTriangles = size_t{1} << 25;
-constexpr int kRings = 8, kSpokes = 16;  // directions that ask whether a place is open
-constexpr int kPanes = 8;                // places of the window, a side
-constexpr float kLift = 2e-3f;           // rays begin off the surface that they leave
+constexpr int kRings = 8, kSpokes = 16;  // directions tested for openness
+constexpr int kPanes = 8;                // window points per side
+constexpr float kLift = 2e-3f;           // offset of ray origins from the surface
 
 Place Plus(const Place& a, const Place& b, float times) {
   return {a[0] + times * b[0], a[1] + times * b[1], a[2] + times * b[2]};
@@ -31,7 +31,7 @@ Place ToUnit(const Place& a) {
   return square > 0 ? Plus({0, 0, 0}, a, 1 / std::sqrt(square)) : Place{0, 0, 0};
 }
 
-// Cuts one triangle after the other; an edge's middle is made once for both sides.
+// Subdivides triangles one after another, creating an edge's midpoint once for both sides.
 class Cutter {
  public:
   Cutter(Mesh& mesh, float longest) : mesh_(mesh), square_(longest * longest) {}
@@ -46,7 +46,7 @@ class Cutter {
       const int32_t material = materials.back();
       pending.pop_back();
       materials.pop_back();
-      // The longest edge first, by the edge alone: the other side of it is cut in the same place.
+      // The longest edge first, chosen by the edge alone, so that both sides of it are cut alike.
       size_t longest = 3;
       float most = square_;
       for (size_t k = 0; k < 3; ++k) {
@@ -101,7 +101,7 @@ class Cutter {
   std::map<std::pair<uint32_t, uint32_t>, uint32_t> middles_;
 };
 
-// Every corner gets a vertex of its own where the mesh has no normal for it: light differs between faces.
+// Gives each corner without a normal a vertex of its own, because light differs between faces.
 void GiveNormals(Mesh& mesh) {
   mesh.normals.resize(mesh.positions.size(), {0, 0, 0});
   for (auto& triangle : mesh.triangles) {
@@ -124,7 +124,7 @@ void GiveNormals(Mesh& mesh) {
 class Daylight {
  public:
   Daylight(const RayTracer& tracer, const DaylightOptions& options) : tracer_(tracer), options_(options) {
-    // Equal solid angles times cosine: rings of equal area on the disc below the hemisphere.
+    // Cosine-weighted: rings of equal area on the disc below the hemisphere.
     for (int ring = 0; ring < kRings; ++ring) {
       const double radius = std::sqrt((ring + 0.5) / kRings);
       for (int spoke = 0; spoke < kSpokes; ++spoke) {
@@ -145,7 +145,7 @@ class Daylight {
     pane_area_ = std::sqrt(Dot(across, across)) / (kPanes * kPanes);
   }
 
-  // Of the brighter side: what is closed is dark inside, and some files' normals point there.
+  // Light of the brighter side: closed objects are dark inside, and some files' normals point inwards.
   float At(const Place& place, const Place& normal) const {
     return std::max(OfSide(place, normal), OfSide(place, Plus({0, 0, 0}, normal, -1)));
   }
@@ -176,7 +176,7 @@ class Daylight {
 
   const RayTracer& tracer_;
   DaylightOptions options_;
-  std::vector<Place> directions_;  // around +z
+  std::vector<Place> directions_;  // hemisphere around +z
   std::vector<Place> panes_;
   Place inwards_;
   float pane_area_;

@@ -21,7 +21,7 @@ std::string NumberedName(int i, int count) {
   return std::string(digits - number.size(), '0') + number;
 }
 
-// Directions of the rings' cameras: ring r gets the views r, r + rings, …, so that a prefix of the list is spread out.
+// View directions of the rings. Ring r gets views r, r + rings, …, so that any prefix is spread out.
 std::vector<Direction3> RingDirections(const CameraRig& rig) {
   std::vector<Direction3> out;
   const int rings = static_cast<int>(rig.elevations.size());

@@ -9,13 +9,13 @@
 namespace anchorsplat {
 
 enum class RigKind {
-  kSphere,  // a Fibonacci sphere: evenly spread, the same on every machine (OrbitCameras)
-  kRings,   // circles around the vertical axis at given elevations, evenly spaced, each turned against the one below
+  kSphere,  // Fibonacci sphere: evenly spread, the same on every machine (OrbitCameras)
+  kRings,   // evenly spaced on circles around the vertical axis at given elevations, each rotated against the one below
   kRandom,  // uniform on the sphere, by seed
 };
 
-// Cameras that look at the origin from a sphere around it, y up. The defaults are those of the 3DGS-SR benchmark as far
-// as they are known (146 views) and frame an object of unit size.
+// Cameras on a sphere looking at the origin, y up. Defaults are those of the 3DGS-SR benchmark as far as known (146
+// views) and frame an object of unit size.
 struct CameraRig {
   RigKind kind = RigKind::kSphere;
   int views = 146;
@@ -25,9 +25,9 @@ struct CameraRig {
   uint64_t seed = 0;                              // random
 };
 
-// The rig's views at `width` × `height` pixels, named "000", "001", … in order (four digits from 1000 views on, so that
-// names sort). Errors (kBadArgument): no views, more than 100,000, radius not positive, field of view out of (0°,
-// 180°), an elevation beyond ±90°.
+// The rig's views at `width` × `height` pixels, named "000", "001", … in order (four digits from 1000 views, so that
+// names sort). Errors (kBadArgument): no views or more than 100,000; radius not positive; field of view not in (0°,
+// 180°); an elevation beyond ±90°.
 Result<CameraSet> MakeRig(const CameraRig& rig, int width, int height);
 
 }  // namespace anchorsplat

@@ -1,7 +1,7 @@
 #pragma once
 
-// Embree 3 (Debian 12) and Embree 4 (Debian 13) differ in how a query takes its context and flags. Whatever else uses
-// Embree includes this header instead of Embree's own.
+// Embree 3 (Debian 12) and Embree 4 (Debian 13) pass a query's context and flags differently. Include this header
+// instead of Embree's own.
 #if ANCHORSPLAT_EMBREE_MAJOR >= 4
 #include <embree4/rtcore.h>
 #else
@@ -12,12 +12,12 @@ namespace anchorsplat::embree {
 
 #if ANCHORSPLAT_EMBREE_MAJOR >= 4
 
-// What filters of a query are handed; a query's own data follows it in a struct that begins with it.
+// Passed to filters of a query; to pass more data, begin a struct with it.
 using QueryContext = RTCRayQueryContext;
 
 inline void Init(QueryContext& context) { rtcInitRayQueryContext(&context); }
 
-// The nearest hits of eight rays that run alike, of those where `valid` is −1.
+// Nearest hits of eight coherent rays, those with `valid` −1.
 inline void IntersectCoherent(const int* valid, RTCScene scene, QueryContext& context, RTCRayHit8& rays) {
   RTCIntersectArguments arguments;
   rtcInitIntersectArguments(&arguments);
@@ -26,7 +26,7 @@ inline void IntersectCoherent(const int* valid, RTCScene scene, QueryContext& co
   rtcIntersect8(valid, scene, &rays, &arguments);
 }
 
-// Whether anything is in the way of `ray`.
+// Whether anything blocks `ray`.
 inline bool Occluded(RTCScene scene, QueryContext& context, RTCRay& ray) {
   RTCOccludedArguments arguments;
   rtcInitOccludedArguments(&arguments);

@@ -20,7 +20,7 @@ namespace {
 constexpr const char* kListName = "PluginFurnitureCatalog.properties";
 constexpr uint64_t kLongestList = uint64_t{1} << 26;     // bytes
 constexpr uint64_t kLongestLicence = uint64_t{1} << 20;  // bytes
-constexpr uint64_t kLongestLibrary = uint64_t{1} << 31;  // bytes: it is kept in memory
+constexpr uint64_t kLongestLibrary = uint64_t{1} << 31;  // bytes, kept in memory
 constexpr std::array<float, 9> kIdentity = {1, 0, 0, 0, 1, 0, 0, 0, 1};
 
 std::string FolderOf(const std::string& member) {
@@ -30,7 +30,7 @@ std::string FolderOf(const std::string& member) {
 
 std::string FileOf(const std::string& member) { return member.substr(member.find_last_of('/') + 1); }
 
-// Nine numbers; the identity when they are not, which is what an entry without them means.
+// Parses nine numbers; anything else means the identity.
 std::array<float, 9> ParseRotation(const std::string& text) {
   std::array<float, 9> rotation{};
   std::istringstream in(text);
@@ -86,7 +86,7 @@ void FurnitureCatalog::ReadEntries(const JavaProperties& properties) {
     if (property == "modelRotation") entry.rotation = ParseRotation(value);
   }
   for (auto& [number, entry] : by_number) {
-    if (entry.model.empty()) continue;  // a property of nothing
+    if (entry.model.empty()) continue;  // no such entry
     entry.number = number;
     entry.key = std::filesystem::path(FileOf(entry.model)).stem().string();
     if (entry.rotation == std::array<float, 9>{}) entry.rotation = kIdentity;
@@ -95,7 +95,7 @@ void FurnitureCatalog::ReadEntries(const JavaProperties& properties) {
 }
 
 void FurnitureCatalog::FindLicences(const JavaProperties& properties) {
-  // What holds for the whole library.
+  // Applies to the whole library.
   std::string common = SpdxIdentifier(properties.Get("license"));
   if (common.empty()) common = SpdxIdentifier(properties.header);
   if (common.empty()) common = properties.Get("license");
@@ -114,7 +114,7 @@ void FurnitureCatalog::FindLicences(const JavaProperties& properties) {
       const auto text = archive_->Read(file->second, kLongestLicence);
       std::string id = text.ok() ? SpdxIdentifier(*text) : std::string();
       if (!id.empty()) {
-        // A free model that was given pictures under the library's licence needs both.
+        // A free model with added pictures under the library's licence is subject to both.
         if (id == "CC0-1.0" && common != id && !common.empty() && MentionsAttribution(*text)) id += " AND " + common;
         origin.licence = std::move(id);
         origin.licence_source = file->second;

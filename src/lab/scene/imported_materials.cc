@@ -15,13 +15,13 @@ namespace anchorsplat {
 
 namespace {
 
-// Black materials with a picture are common in OBJ files, so only formats that define the product get it.
+// Formats that define colour × picture. In OBJ files, black materials with a picture are common.
 bool MultipliesPicture(const std::string& ending) { return ending == ".gltf" || ending == ".glb" || ending == ".ac"; }
 
-// How one material wants its picture; materials that want the same share it.
+// A picture as a material needs it; equal needs share one texture.
 struct PictureKey {
   std::string path;
-  std::array<uint8_t, 3> factor;  // 255: as it is
+  std::array<uint8_t, 3> factor;  // 255: unchanged
   bool opaque;
   auto operator<=>(const PictureKey&) const = default;
 };
@@ -31,7 +31,7 @@ class PictureCollector {
   PictureCollector(const RawScene& scene, const AssetSource& source, const MeshLimits& limits)
       : scene_(scene), source_(source), limits_(limits), pixels_left_(limits.max_textures_pixels) {}
 
-  // Index in textures(), or why there is none.
+  // Index in textures(), or the error.
   Result<int> Get(const PictureKey& key) {
     if (const auto known = index_.find(key); known != index_.end()) return known->second;
     Result<int> index = Load(key);
@@ -81,7 +81,7 @@ class PictureCollector {
     return texture;
   }
 
-  // "*3" is the fourth embedded picture; others have names.
+  // "*3" is the fourth embedded picture; others are found by name.
   const EmbeddedPicture* Embedded(const std::string& path) const {
     for (size_t i = 0; i < scene_.pictures.size(); ++i) {
       const EmbeddedPicture& picture = scene_.pictures[i];
@@ -108,7 +108,7 @@ void LoadMaterials(const RawScene& scene, const AssetSource& source, const std::
   for (const RawMaterial& raw : scene.materials) {
     Material material;
     material.name = raw.name;
-    // AC3D makes a material of every pair of colour and picture, all of one name.
+    // AC3D exports a material per pair of colour and picture, all with the same name.
     const auto warn = [&](const auto&... words) {
       std::string warning = Cat("material \"", Printable(material.name), "\": ", words...);
       if (said.insert(warning).second) warnings.push_back(std::move(warning));

@@ -10,9 +10,8 @@
 
 namespace anchorsplat {
 
-// Fills `mesh.materials` and `mesh.textures` from what the file says (mesh_import.h says what becomes of colours).
-// `ending` is the file's, in small letters with its dot. Pictures that are missing or cannot be decoded are warnings
-// that name the material and the picture; the material keeps its colour.
+// Fills `mesh.materials` and `mesh.textures` (mesh_import.h explains colours). `ending`: lower-case extension with dot.
+// For pictures missing or undecodable, adds warnings that name material and picture; the material keeps its colour.
 void LoadMaterials(const RawScene& scene, const AssetSource& source, const std::string& ending,
                    const MeshLimits& limits, Mesh& mesh, std::vector<std::string>& warnings);
 

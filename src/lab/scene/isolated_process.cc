@@ -25,7 +25,7 @@
 
 #if defined(__has_feature)
 #if __has_feature(address_sanitizer)
-#define __SANITIZE_ADDRESS__ 1  // clang asks in another way
+#define __SANITIZE_ADDRESS__ 1  // clang uses __has_feature
 #endif
 #endif
 
@@ -33,7 +33,7 @@ namespace anchorsplat {
 
 namespace {
 
-// Messages both ways: what it is, how long it is, the bytes.
+// Message format in both directions: kind, length, bytes.
 enum class Kind : uint64_t { kQuestion = 1, kAnswer, kResult, kFailure };
 
 #ifndef MSG_NOSIGNAL
@@ -43,7 +43,7 @@ constexpr int MSG_NOSIGNAL = 0;
 bool SendAll(int socket, const void* data, size_t size) {
   const char* at = static_cast<const char*>(data);
   while (size > 0) {
-    // A signal would end the program when the other side is gone.
+    // Without MSG_NOSIGNAL, SIGPIPE would end the program if the other side is gone.
     const ssize_t sent = ::send(socket, at, size, MSG_NOSIGNAL);
     if (sent < 0 && errno == EINTR) continue;
     if (sent <= 0) return false;
@@ -70,7 +70,7 @@ bool Send(int socket, Kind kind, std::string_view bytes) {
   return SendAll(socket, head, sizeof head) && SendAll(socket, bytes.data(), bytes.size());
 }
 
-// In blocks: a child that has lost its mind may announce any length.
+// Receives block by block, as a corrupted child may announce any length.
 bool Receive(int socket, uint64_t longest, Kind& kind, std::string& bytes) {
   uint64_t head[2];
   if (!ReceiveAll(socket, head, sizeof head) || head[1] > longest) return false;
@@ -92,7 +92,7 @@ void Limit(int resource, uint64_t value) {
   (void)::setrlimit(static_cast<decltype(RLIMIT_CPU)>(resource), &limit);
 }
 
-// Address space the process has now, bytes; 0 where the system does not say.
+// Current address space of the process in bytes; 0 if unknown.
 uint64_t AddressSpace() {
   unsigned long pages = 0;
   if (std::FILE* file = std::fopen("/proc/self/statm", "r")) {
@@ -102,7 +102,7 @@ uint64_t AddressSpace() {
   return uint64_t{pages} * static_cast<uint64_t>(::sysconf(_SC_PAGESIZE));
 }
 
-// Only calls that are safe between fork and the end of the process of a program with many threads.
+// Uses only calls that are safe after fork in a multithreaded program.
 void PrepareChild(const IsolationLimits& limits, uint64_t address_space) {
   for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL, SIGINT, SIGTERM, SIGXCPU}) {
     ::signal(signal, SIG_DFL);
@@ -113,12 +113,12 @@ void PrepareChild(const IsolationLimits& limits, uint64_t address_space) {
     (void)::dup2(silence, STDERR_FILENO);
   }
 #ifdef __linux__
-  (void)::prctl(PR_SET_PDEATHSIG, SIGKILL);  // nobody would take the result
+  (void)::prctl(PR_SET_PDEATHSIG, SIGKILL);  // the result would be useless
 #endif
   Limit(RLIMIT_CORE, 0);
   Limit(RLIMIT_CPU, static_cast<uint64_t>(limits.max_cpu_seconds));
 #ifdef __SANITIZE_ADDRESS__
-  (void)address_space;  // its shadow takes terabytes of addresses
+  (void)address_space;  // the sanitizer's shadow memory takes terabytes of addresses
 #else
   if (address_space > 0) Limit(RLIMIT_AS, address_space + limits.max_memory);
 #endif
@@ -145,7 +145,7 @@ void PrepareChild(const IsolationLimits& limits, uint64_t address_space) {
   } catch (...) {
     sent = Send(socket, Kind::kFailure, "failed without a word");
   }
-  ::_exit(sent ? 0 : 1);  // without the destructors and buffers of the parent's objects
+  ::_exit(sent ? 0 : 1);  // skips destructors and buffers of the parent's objects
 }
 
 std::string HowItEnded(int status, const IsolationLimits& limits) {
@@ -164,7 +164,7 @@ Result<std::string> RunIsolated(const IsolationLimits& limits, const std::functi
   std::array<int, 2> sockets{};
   pid_t child = -1;
   {
-    // No child of another thread may inherit this child's end: its end would not be noticed.
+    // Otherwise another thread's child could inherit this child's socket and hide its end.
     static std::mutex forking;
     const std::lock_guard lock(forking);
     if (::socketpair(AF_UNIX, SOCK_STREAM, 0, sockets.data()) != 0) {
@@ -192,7 +192,7 @@ Result<std::string> RunIsolated(const IsolationLimits& limits, const std::functi
     if (!Send(sockets[0], Kind::kAnswer, answer(bytes))) break;
   }
   ::close(sockets[0]);
-  if (!connected) ::kill(child, SIGKILL);  // it may still be sending what is too long; a dead one does not mind
+  if (!connected) ::kill(child, SIGKILL);  // it may still be sending too much; harmless if dead
   int status = 0;
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }

@@ -27,7 +27,7 @@ void AppendUtf8(uint32_t code, std::string& out) {
   }
 }
 
-// The four hexadecimal digits at `at`; −1 when they are none.
+// Value of four hexadecimal digits at `at`; −1 if invalid.
 int32_t HexUnit(std::string_view text, size_t at) {
   if (at + 4 > text.size()) return -1;
   int32_t value = 0;
@@ -43,7 +43,7 @@ int32_t HexUnit(std::string_view text, size_t at) {
   return value;
 }
 
-// Escapes resolved, Latin-1 to UTF-8. Half a surrogate pair becomes the replacement character.
+// Resolves escapes and converts Latin-1 to UTF-8. A lone surrogate becomes the replacement character.
 std::string Unescaped(std::string_view text) {
   std::string out;
   for (size_t i = 0; i < text.size(); ++i) {
@@ -77,7 +77,7 @@ std::string Unescaped(std::string_view text) {
   return out;
 }
 
-// The next line without its end; `at` moves behind it.
+// Returns the next line without its end and moves `at` behind it.
 std::string_view NextLine(std::string_view text, size_t& at) {
   const size_t begin = at;
   const size_t end = text.find_first_of("\r\n", begin);
@@ -110,7 +110,7 @@ JavaProperties ParseJavaProperties(std::string_view text) {
     if (line.empty()) continue;
     if (line[0] == '#' || line[0] == '!') {
       if (out.entries.empty()) {
-        // Comments have no escapes, only the encoding.
+        // Comments have no escapes; only the encoding is converted.
         for (const char c : WithoutLeadingBlanks(line.substr(1))) AppendUtf8(static_cast<uint8_t>(c), out.header);
         out.header += '\n';
       }

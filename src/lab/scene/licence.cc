@@ -7,9 +7,9 @@ namespace anchorsplat {
 
 namespace {
 
-// Small letters, with every run of blanks and dashes as one blank, so that "CC-BY" and "CC BY" are the same words.
+// Lower case, with runs of blanks and dashes as single blanks, so that "CC-BY" equals "CC BY".
 std::string Normalised(std::string_view text) {
-  // A licence is named at the beginning; nobody's book is read to the end.
+  // Licences are named at the beginning; long documents are not searched to the end.
   constexpr size_t kLongest = 1 << 18;
   std::string out;
   for (const char c : text.substr(0, kLongest)) {
@@ -24,7 +24,7 @@ std::string Normalised(std::string_view text) {
 
 bool IsWordCharacter(char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '#'; }
 
-// Where `words` stand as whole words from `from` on.
+// Position of `words` as whole words, starting at `from`.
 size_t FindWords(std::string_view text, std::string_view words, size_t from = 0) {
   for (size_t at = text.find(words, from); at != std::string_view::npos; at = text.find(words, at + 1)) {
     const size_t end = at + words.size();
@@ -39,7 +39,7 @@ bool Eat(std::string_view& text, std::string_view prefix) {
   return true;
 }
 
-// "3.0" at the beginning of `text`, eaten; "" when there is none.
+// Consumes a version such as "3.0" at the start of `text`; "" if there is none.
 std::string EatVersion(std::string_view& text) {
   if (text.size() < 3 || text[0] < '1' || text[0] > '9' || text[1] != '.' || text[2] < '0' || text[2] > '9') return {};
   std::string version(text.substr(0, 3));
@@ -47,7 +47,7 @@ std::string EatVersion(std::string_view& text) {
   return version;
 }
 
-// What follows "creativecommons.org/licenses/by".
+// Parses what follows "creativecommons.org/licenses/by".
 std::string FromAddress(std::string_view rest) {
   std::string id = "CC-BY";
   if (Eat(rest, " nc")) id += "-NC";
@@ -59,7 +59,7 @@ std::string FromAddress(std::string_view rest) {
   return id + "-" + version + (rest.starts_with("/us") ? "-US" : "");
 }
 
-// What follows "creative commons attribution".
+// Parses what follows "creative commons attribution".
 std::string FromName(std::string_view rest) {
   std::string id = "CC-BY";
   if (Eat(rest, " noncommercial") || Eat(rest, " non commercial")) id += "-NC";
@@ -71,7 +71,7 @@ std::string FromName(std::string_view rest) {
   return id + "-" + version + (rest.starts_with(" united states") ? "-US" : "");
 }
 
-// What follows "cc by".
+// Parses what follows "cc by".
 std::string FromShortName(std::string_view rest) {
   std::string id = "CC-BY";
   if (Eat(rest, " nc")) id += "-NC";
@@ -82,7 +82,7 @@ std::string FromShortName(std::string_view rest) {
   return version.empty() ? std::string() : id + "-" + version;
 }
 
-// What follows "gnu general public license" or "gpl": a version nearby and whether later ones will do.
+// Parses what follows "gnu general public license" or "gpl": a nearby version, and whether later ones are allowed.
 std::string FromGnu(std::string_view rest, std::string_view family) {
   // "… as published by the Free Software Foundation; either version 2 of the License, or (at your option) any later".
   constexpr size_t kReach = 160;
@@ -117,12 +117,12 @@ std::string FromGpl(std::string_view rest) { return FromGnu(rest, "GPL"); }
 std::string FromLgpl(std::string_view rest) { return FromGnu(rest, "LGPL"); }
 std::string FromAgpl(std::string_view rest) { return FromGnu(rest, "AGPL"); }
 
-// What follows "apache license".
+// Parses what follows "apache license".
 std::string FromApache(std::string_view rest) {
   return rest.substr(0, 20).find("2.0") != std::string_view::npos ? "Apache-2.0" : "";
 }
 
-// What follows the first words of the BSD licences.
+// Parses what follows the first words of BSD licences.
 std::string FromBsd(std::string_view rest) {
   return rest.substr(0, 2000).find("neither the name") != std::string_view::npos ? "BSD-3-Clause" : "BSD-2-Clause";
 }
@@ -150,7 +150,7 @@ std::string SpdxIdentifier(std::string_view text) {
   }
   const auto search = [&](std::string_view prefix, std::string (*read)(std::string_view)) {
     for (size_t at = normal.find(prefix); at < first; at = normal.find(prefix, at + 1)) {
-      if (at > 0 && IsWordCharacter(normal[at - 1])) continue;  // "lgpl" is no "gpl"
+      if (at > 0 && IsWordCharacter(normal[at - 1])) continue;  // "lgpl" is not "gpl"
       found(at, read(std::string_view(normal).substr(at + prefix.size())));
     }
   };

@@ -18,7 +18,7 @@ Status CheckCount(const char* what, size_t have, size_t vertices) {
   return Error{ErrorCode::kBadArgument, Cat("mesh has ", vertices, " positions and ", have, " ", what)};
 }
 
-// Twice the area, in double: the box may be kilometres wide or micrometres.
+// Twice the area, in double: meshes may measure kilometres or micrometres.
 double DoubleArea(const Vec3& a, const Vec3& b, const Vec3& c) {
   const double u[3] = {double{b[0]} - a[0], double{b[1]} - a[1], double{b[2]} - a[2]};
   const double v[3] = {double{c[0]} - a[0], double{c[1]} - a[1], double{c[2]} - a[2]};

@@ -12,7 +12,7 @@ namespace anchorsplat {
 
 namespace {
 
-// An entry that views the elements of a vector of numbers or of arrays of numbers.
+// Tensor entry viewing a vector of numbers or of arrays of numbers.
 template <typename T>
 TensorEntry Entry(std::string name, TensorType type, std::vector<int64_t> shape, const std::vector<T>& values) {
   TensorEntry entry;
@@ -26,7 +26,7 @@ TensorEntry Entry(std::string name, TensorType type, std::vector<int64_t> shape,
 
 std::string TextureName(size_t i) { return Cat("texture.", i); }
 
-// Copies tensor `name` of `type` and any number of rows of `columns` (0: plain numbers) into `out`.
+// Copies tensor `name` of `type`, any number of rows of `columns` (0: scalars), to `out`.
 template <typename T>
 Status Take(const TensorFile& file, const std::string& name, TensorType type, int64_t columns, std::vector<T>& out) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const TensorEntry* entry, file.Require(name));

@@ -33,13 +33,13 @@ std::string Ending(const std::string& name) {
   return ending;
 }
 
-// assimp believes a PLY header and loops over the rows it announces, which may be 10^308.
+// Checks a PLY header: assimp trusts it and loops over the announced rows, perhaps 10^308.
 Status CheckPly(const std::string& bytes) {
   const InputFile head = InputFile::FromBytes("header", bytes.substr(0, kMaxPlyHeader));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const PlyHeader header, ReadPlyHeader(head));
   uint64_t left = bytes.size() - std::min<uint64_t>(bytes.size(), header.body);
   for (const PlyElement& element : header.elements) {
-    // In text every value takes a digit and what parts it from the next.
+    // In ASCII, a value takes at least a digit and a separator.
     const uint64_t row = header.encoding == PlyEncoding::kAscii ? 2 * element.properties.size() : element.row_size();
     const auto count = static_cast<uint64_t>(element.count);
     if (count > 0 && (row == 0 || count > (left + 1) / row)) {
@@ -51,7 +51,7 @@ Status CheckPly(const std::string& bytes) {
   return {};
 }
 
-// Reads the files that assimp asks for. The mesh itself is read once, when it is known that it is there.
+// Serves the files that assimp requests. Reads the mesh itself once, after checking that it exists.
 class FileDesk {
  public:
   FileDesk(const AssetSource& source, const MeshLimits& limits) : source_(source), limits_(limits) {}
@@ -74,8 +74,8 @@ class FileDesk {
   }
   int64_t lines_and_points() const { return lines_and_points_; }
 
-  // What an OBJ file names in vain. assimp makes a grey material of a name it does not know and says nothing, and for a
-  // library that is missing it tries a name of its own, which is nobody's mistake.
+  // Warns of materials missing for an OBJ file. assimp silently makes unknown ones grey, and tries a name of its own
+  // for a missing library, which must not be reported.
   void WarnOfMaterials(std::vector<std::string>& warnings) const {
     for (const std::string& library : material_names_.libraries) {
       if (source_.Has(library)) continue;
@@ -104,7 +104,7 @@ class FileDesk {
   int64_t lines_and_points_ = 0;
 };
 
-// assimp in a process of its own: 5.2 crashes, asserts or never ends on damaged files of every format but STL.
+// Runs assimp in a separate process: 5.2 crashes, asserts or loops on damaged files of every format but STL.
 Result<RawScene> ReadScene(FileDesk& desk, const std::string& name, const MeshReadOptions& options) {
   const std::string ending = Ending(name);
   if (!options.isolated) {
@@ -126,7 +126,7 @@ Result<RawScene> ReadScene(FileDesk& desk, const std::string& name, const MeshRe
                                          name, ending, options.limits));
                                    },
                                    [&](std::string_view file) {
-                                     // One byte says that the file is there, which may be empty.
+                                     // One byte indicates existence, as the file may be empty.
                                      const auto bytes = desk.Read(std::string(file));
                                      return bytes ? "1" + *bytes : std::string();
                                    }));
@@ -165,7 +165,7 @@ bool IsMeshName(const std::string& name) {
 
 Result<ImportedMesh> ImportMesh(const AssetSource& source, const std::string& name, const std::string& where,
                                 const MeshReadOptions& options) {
-  // A large file may still ask for more memory than there is, and assimp throws when it runs in this process.
+  // A large file may still exhaust memory; assimp throws when run in this process.
   try {
     auto imported = Import(source, name, options);
     if (!imported.ok()) return Error{imported.error().code, Cat(where, ": ", imported.error().message)};

@@ -35,7 +35,7 @@ Address Parse(const std::string& address) {
   return {address, {}, false};
 }
 
-// A file beside the mesh that names a licence; the first by name, so that it is the same everywhere.
+// Finds a licence file beside the mesh; the first by name, for determinism.
 void FindLicenceBeside(const fs::path& path, MeshOrigin& origin) {
   std::vector<fs::path> candidates;
   std::error_code error;
@@ -63,7 +63,7 @@ void FindLicenceBeside(const fs::path& path, MeshOrigin& origin) {
     return;
   }
   if (candidates.empty()) return;
-  // Something is said, though not to us.
+  // A licence file exists, but we do not recognise the licence.
   origin.licence_source = candidates.front().filename().string();
   origin.licence = Cat("licence not recognised, see ", Printable(origin.licence_source));
 }
@@ -81,7 +81,7 @@ std::string MeshShortName(const std::string& address) {
   const Address parsed = Parse(address);
   const std::string& name = parsed.object.empty() ? parsed.file : parsed.object;
   const fs::path last = name.substr(name.find_last_of('/') + 1);
-  // Keys of libraries and folders of pictures have dots that begin no ending.
+  // Dots in library keys and picture folders do not start an extension.
   return (IsMeshName(name) || IsMeshLibrary(name) ? last.stem() : last).string();
 }
 
@@ -91,7 +91,7 @@ Result<std::vector<std::string>> ExpandMeshAddress(const std::string& address) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const FurnitureCatalog catalog, FurnitureCatalog::Open(parsed.file));
   std::vector<std::string> all;
   for (const CatalogEntry& entry : catalog.entries()) {
-    // Keys that several entries share are told apart by number.
+    // Shared keys are distinguished by number.
     const bool unique = catalog.Find(entry.key) == &entry;
     all.push_back(unique ? Cat(parsed.file, "#", entry.key) : Cat(parsed.file, "##", entry.number));
   }

@@ -8,26 +8,26 @@
 
 namespace anchorsplat {
 
-// Reads a mesh by its address: a file's path (mesh_import.h lists the formats), or an object of a furniture library,
-// "catalog.sh3f#barrel" (furniture_catalog.h). A file's licence is that of a licence file beside it (a name with
-// "licen" or "copying" in it, without ending or .txt, .html, .md), the first that names one (licence.h); where none
-// does, the licence says so and which file to read. The object's name is the file's.
+// Reads a mesh by address: a file's path (formats: mesh_import.h), or an object of a furniture library,
+// "catalog.sh3f#barrel" (furniture_catalog.h). A file's licence comes from licence files beside it (names with "licen"
+// or "copying", without extension or .txt, .html, .md), the first that names one (licence.h); if none does, the licence
+// says so and which file to read. The object is named after the file.
 //
-// Errors: kNotFound: no such file or object; otherwise as ImportMesh and FurnitureCatalog::Open.
+// Errors: kNotFound: no such file or object; else those of ImportMesh and FurnitureCatalog::Open.
 Result<ImportedMesh> ReadMesh(const std::string& address, const MeshReadOptions& options = {});
 
-// What an address stands for: itself, or every object of the library when it is one without "#object". Errors as
-// FurnitureCatalog::Open. Whether files exist is not asked.
+// Expands an address: a library without "#object" into all its objects, any other into itself. Errors: those of
+// FurnitureCatalog::Open. Does not check that files exist.
 Result<std::vector<std::string>> ExpandMeshAddress(const std::string& address);
 
-// True when the address looks like a mesh: a mesh's file name, a furniture library or an object of one.
+// Whether the address looks like a mesh file, a furniture library or an object of one.
 bool IsMeshAddress(const std::string& address);
 
 // True for a whole library.
 bool IsMeshLibrary(const std::string& address);
 
-// A short name for files made from the mesh: "barrel" of "models/barrel.obj" and of "catalog.sh3f#barrel". Only
-// the ending of a mesh's or a library's file goes: "catalog.sh3f#chair.v2" is "chair.v2".
+// Short name for files made from the mesh: "barrel" for "models/barrel.obj" and "catalog.sh3f#barrel". Drops only known
+// extensions: "catalog.sh3f#chair.v2" gives "chair.v2".
 std::string MeshShortName(const std::string& address);
 
 }  // namespace anchorsplat

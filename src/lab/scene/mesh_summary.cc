@@ -57,7 +57,7 @@ class SurfacePoints {
 std::array<float, 32> ShapeDistribution(const Mesh& mesh) {
   constexpr size_t kPairs = 16'384;
   const SurfacePoints points(mesh);
-  Random random(1);  // always the same points: summaries are compared with each other
+  Random random(1);  // fixed, because summaries are compared with each other
   std::vector<double> distances(kPairs);
   double mean = 0;
   for (double& distance : distances) {

@@ -11,7 +11,7 @@
 
 namespace anchorsplat {
 
-// Small meshes whose pictures are known.
+// Small meshes with known pictures.
 
 // Adds a parallelogram from `corner` along `right` and `up` with texture coordinates 0–1.
 inline void AddQuad(Mesh& mesh, const std::array<float, 3>& corner, const std::array<float, 3>& right,
@@ -63,7 +63,7 @@ inline Mesh SphereMesh(float radius, int rings, bool smooth) {
   return mesh;
 }
 
-// Triangles strewn through the unit cube, each of a colour of its own.
+// Random triangles in the unit cube, each with its own colour.
 inline Mesh RandomTriangles(int count, uint64_t seed) {
   Random random(seed);
   Mesh mesh;

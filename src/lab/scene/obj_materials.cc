@@ -15,7 +15,7 @@ std::string_view Trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
 }
 
-// Calls `take` with the statement and what follows it, for every line that has both.
+// Calls `take` with keyword and rest for every line that has both.
 void ForEachStatement(std::string_view text,
                       const std::function<void(std::string_view statement, std::string_view name)>& take) {
   while (!text.empty()) {

@@ -7,8 +7,8 @@
 
 namespace anchorsplat {
 
-// What an OBJ file says of materials, each name once and in the order of the file. As assimp, a name is the rest of the
-// line, blanks in it included.
+// Material names in an OBJ file, each once, in file order. As in assimp, a name is the rest of the line, including
+// blanks.
 struct ObjMaterialNames {
   std::vector<std::string> libraries;  // mtllib
   std::vector<std::string> used;       // usemtl

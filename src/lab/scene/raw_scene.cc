@@ -31,7 +31,7 @@ class Packer {
   std::string bytes_;
 };
 
-// Everything after the end is zero or empty, and ok() false.
+// Reads a packed scene. Past the end, reads give zero or empty and ok() is false.
 class Unpacker {
  public:
   explicit Unpacker(std::string_view bytes) : bytes_(bytes) {}
@@ -47,7 +47,7 @@ class Unpacker {
   void Flag(bool& value) {
     uint8_t byte = 0;
     Number(byte);
-    value = byte != 0;  // any other byte in a bool is undefined behaviour
+    value = byte != 0;  // another value in a bool would be undefined behaviour
   }
   void Text(std::string& text) {
     uint64_t size = 0;
@@ -66,7 +66,7 @@ class Unpacker {
     std::memcpy(values.data(), bytes_.data(), size * sizeof(T));
     bytes_.remove_prefix(size * sizeof(T));
   }
-  // A count of things that take at least a byte each.
+  // A count of elements of at least one byte each.
   uint64_t Count() {
     uint64_t count = 0;
     Number(count);
@@ -96,7 +96,7 @@ bool KeepsItsPromises(const RawScene& scene) {
     if (!AllFinite(c.positions[i]) || !AllFinite(c.normals[i])) return false;
   }
   for (const EmbeddedPicture& picture : scene.pictures) {
-    // Both are 32 bits: the product fits, also times four when it is compared the other way round.
+    // Both factors have 32 bits, so the product fits, even times four.
     const uint64_t pixels = uint64_t{picture.width} * picture.height;
     if (picture.height > 0 && (picture.bytes.size() % 4 != 0 || picture.bytes.size() / 4 != pixels)) return false;
   }

@@ -11,28 +11,28 @@
 
 namespace anchorsplat {
 
-// A mesh file as assimp understood it, before its pictures are read: what passes from the process that reads the file
-// to ours (assimp_import.h).
+// A mesh file as parsed by assimp, before its pictures are read. Passed from the reading process to ours
+// (assimp_import.h).
 struct RawMaterial {
   std::string name;
   bool has_color = false;
   std::array<float, 3> color{};  // 0–1, sRGB
   float opacity = 1;
   bool two_sided = true;
-  bool opaque = false;  // whatever the picture's alpha says
-  std::string picture;  // the colour picture; "" none
-  std::string mask;     // a separate picture of the opacity; "" none
+  bool opaque = false;  // ignores the picture's alpha
+  std::string picture;  // colour picture; "": none
+  std::string mask;     // separate opacity picture; "": none
 };
 
 struct EmbeddedPicture {
-  std::string name;  // besides "*0", "*1" … by position
+  std::string name;  // an alternative to "*0", "*1" … by index
   uint32_t width = 0;
-  uint32_t height = 0;  // 0: `bytes` is a file
-  std::string bytes;    // else [H,W,4] rgba
+  uint32_t height = 0;  // 0: `bytes` is an encoded file
+  std::string bytes;    // otherwise [H,W,4] rgba
 };
 
 struct RawScene {
-  MeshCorners corners;                 // finite; no triangle without area; zero normals where the file gives none
+  MeshCorners corners;                 // finite, no triangle without area; zero normals if the file has none
   std::vector<RawMaterial> materials;  // at least one
   std::vector<EmbeddedPicture> pictures;
   int64_t degenerate = 0;
@@ -43,8 +43,8 @@ struct RawScene {
 
 std::string Pack(const RawScene& scene);
 
-// Trusts nothing, as the packing process may have been damaged by the file it read. kBadFile: not what Pack makes, or
-// a scene that breaks a promise above.
+// Validates everything, as the packing process may have been corrupted by its file. kBadFile: not made by Pack, or a
+// violation of the invariants above.
 Result<RawScene> Unpack(std::string_view bytes);
 
 }  // namespace anchorsplat

@@ -19,8 +19,8 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int kTile = 8;    // pixels per side: what is traced, then shaded, while its hits are in the cache
-constexpr int kPacket = 8;  // rays Embree takes at once with AVX2
+constexpr int kTile = 8;    // pixels per side; traced, then shaded while its hits are cached
+constexpr int kPacket = 8;  // rays per Embree packet with AVX2
 constexpr uint32_t kMiss = RTC_INVALID_GEOMETRY_ID;
 
 struct DeviceRelease {
@@ -32,19 +32,19 @@ struct SceneRelease {
 using Device = std::unique_ptr<std::remove_pointer_t<RTCDevice>, DeviceRelease>;
 using EmbreeScene = std::unique_ptr<std::remove_pointer_t<RTCScene>, SceneRelease>;
 
-// Embree hands its context through to the filter of surfaces with holes.
+// Query context passed to the filter of surfaces with holes.
 struct TraceContext {
   embree::QueryContext base;
   float sample_area;
 };
 
-// The triangles of one Embree geometry, by their number in it.
+// Triangles of an Embree geometry, by primitive number.
 struct Part {
   const SurfaceShader* shader = nullptr;
   std::vector<uint32_t> triangles;
 };
 
-// Rejects hits on transparent texels, so that the ray goes on.
+// Filter: rejects hits on transparent texels, so that the ray continues.
 void RejectHoles(const RTCFilterFunctionNArguments* args) {
   const Part& part = *static_cast<const Part*>(args->geometryUserPtr);
   const float sample_area = reinterpret_cast<const TraceContext*>(args->context)->sample_area;
@@ -59,8 +59,8 @@ void RejectHoles(const RTCFilterFunctionNArguments* args) {
   }
 }
 
-// The way of a camera's rays: those through pixel position (x, y) run along forward + x·right + y·down, so that the
-// distance along a ray is the depth.
+// Camera rays: pixel position (x, y) has direction forward + x·right + y·down, so the distance along the ray is the
+// depth.
 struct RayFan {
   std::array<float, 3> origin;
   std::array<float, 3> corner;  // of the image
@@ -81,7 +81,7 @@ struct RayFan {
 };
 
 struct Hit {
-  SurfacePoint point;  // triangle kMiss: nothing
+  SurfacePoint point;  // triangle kMiss: no hit
   float depth;
 };
 
@@ -103,7 +103,7 @@ void Clear(RTCRayHit8& packet, const std::array<float, 3>& origin) {
 struct RayTracer::Scene {
   Mesh mesh;
   std::unique_ptr<SurfaceShader> shader;
-  Part parts[2];  // 0 solid, 1 with holes: their numbers are Embree's geometry ids, see Create
+  Part parts[2];  // 0 solid, 1 with holes; indices are Embree's geometry ids, see Create
   const Part* part_of[2] = {};
   Device device;
   EmbreeScene embree;
@@ -173,7 +173,7 @@ Result<RayTracer> RayTracer::Create(Mesh mesh) {
     scene->parts[scene->shader->HasHoles(t) ? 1 : 0].triangles.push_back(t);
   }
 
-  // max_isa: see the class comment. It is also as fast as AVX-512 here.
+  // max_isa: see the class comment. AVX-512 is no faster here.
   scene->device.reset(rtcNewDevice("max_isa=avx2"));
   const auto embree_error = [&](const char* what) {
     const RTCError code = rtcGetDeviceError(scene->device.get());
@@ -183,13 +183,13 @@ Result<RayTracer> RayTracer::Create(Mesh mesh) {
   if (scene->device == nullptr) return embree_error("does not start");
   scene->embree.reset(rtcNewScene(scene->device.get()));
   if (scene->embree == nullptr) return embree_error("makes no scene");
-  rtcSetSceneBuildQuality(scene->embree.get(), RTC_BUILD_QUALITY_HIGH);  // every tree is asked a billion times
-  rtcSetSceneFlags(scene->embree.get(), RTC_SCENE_FLAG_ROBUST);          // no rays slip through between two triangles
+  rtcSetSceneBuildQuality(scene->embree.get(), RTC_BUILD_QUALITY_HIGH);  // every tree is queried a billion times
+  rtcSetSceneFlags(scene->embree.get(), RTC_SCENE_FLAG_ROBUST);          // no rays pass between adjacent triangles
   for (const bool with_holes : {false, true}) {
     Part& part = scene->parts[with_holes ? 1 : 0];
     if (!part.triangles.empty() && !scene->Attach(part, with_holes)) return embree_error("does not take the triangles");
   }
-  // An arena of one place, which Embree's tasks do not leave: other runs keep their threads meanwhile.
+  // A single-threaded arena that Embree's tasks cannot leave; other runs keep their threads.
   tbb::task_arena(1).execute([&] { rtcCommitScene(scene->embree.get()); });
   if (rtcGetDeviceError(scene->device.get()) != RTC_ERROR_NONE) return embree_error("does not build its tree");
   return RayTracer(std::move(scene));
@@ -197,7 +197,7 @@ Result<RayTracer> RayTracer::Create(Mesh mesh) {
 
 namespace {
 
-// One picture being made; tiles are independent of each other.
+// Renders one picture; tiles are independent.
 class TileTracer {
  public:
   TileTracer(RTCScene scene, const Part* const* parts, const SurfaceShader& shader, const Camera& camera, int samples)
@@ -216,7 +216,7 @@ class TileTracer {
     hits_.resize(places_x_.size());
   }
 
-  // The pixels of the tile at (x0, y0) that lie in `image`.
+  // Renders the part of the tile at (x0, y0) inside `image`.
   void Trace(int x0, int y0, Image& image, TraceCost& cost) {
     const int columns = std::min(kTile, image.width - x0), rows = std::min(kTile, image.height - y0);
     const double begin = ThreadSeconds();
@@ -229,13 +229,13 @@ class TileTracer {
   }
 
  private:
-  // Hits in the order of the tile's pixels, then of samples, row by row. Rays outside the image are not sent.
+  // Casts rays in order of pixels, then samples, row by row. Skips rays outside the image.
   void CastRays(int x0, int y0, int columns, int rows) {
     RTCRayHit8 packet;
     Clear(packet, fan_.origin);
     alignas(32) int valid[kPacket];
     const float left = static_cast<float>(x0), top = static_cast<float>(y0);
-    const size_t count = static_cast<size_t>(kTile * rows * per_pixel_);  // a multiple of the packet
+    const size_t count = static_cast<size_t>(kTile * rows * per_pixel_);  // a multiple of kPacket
     for (size_t first = 0; first < count; first += kPacket) {
       for (size_t i = 0; i < kPacket; ++i) {
         const float px = places_x_[first + i], py = places_y_[first + i];
@@ -290,7 +290,7 @@ class TileTracer {
   RayFan fan_;
   int per_pixel_;
   TraceContext context_;
-  std::vector<float> places_x_;  // of the tile's rays, pixels from its corner
+  std::vector<float> places_x_;  // of the tile's rays, in pixels from its corner
   std::vector<float> places_y_;
   std::vector<Hit> hits_;
 };
@@ -333,8 +333,8 @@ Result<Image> RayTracer::Render(const Camera& camera, const TraceOptions& option
     const std::lock_guard<std::mutex> lock(mutex);
     if (cost != nullptr) *cost += mine;
   };
-  // Isolated: a thread that waits for the last rows must not begin another view meanwhile, of a caller that makes
-  // several at once, or pictures would pile up.
+  // Isolated: a thread waiting for the last rows must not start another view of a caller that renders several at once,
+  // or pictures would pile up.
   tbb::this_task_arena::isolate([&] { ParallelFor(0, coverage.rows(), 4, trace_rows); });
   return image;
 }
@@ -381,9 +381,9 @@ std::vector<RayTracer::Sighting> RayTracer::LookAtPoints(std::span<const Surface
     ray.dir_x = direction[0] = place[0] - ray.org_x;
     ray.dir_y = direction[1] = place[1] - ray.org_y;
     ray.dir_z = direction[2] = place[2] - ray.org_z;
-    ray.tfar = 1 - 1e-3f;  // short of the point, whose own surface does not hide it
+    ray.tfar = 1 - 1e-3f;  // just short of the point, so that its own surface does not block it
     ray.mask = ~0u;
-    // These rays have length 1 at the point, the camera's have depth 1: on its axis the two differ by the distance.
+    // These rays have length 1 at the point, camera rays depth 1; on the axis they differ by the distance.
     const float distance =
         std::sqrt(direction[0] * direction[0] + direction[1] * direction[1] + direction[2] * direction[2]);
     TraceContext context;

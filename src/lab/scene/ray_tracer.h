@@ -15,11 +15,11 @@
 namespace anchorsplat {
 
 struct TraceOptions {
-  int samples = 4;  // rays per pixel and side, on a regular grid: 4 is 16 rays a pixel
+  int samples = 4;  // rays per pixel side, on a regular grid: 4 means 16 rays per pixel
 };
 inline constexpr int kMaxTraceSamples = 16;
 
-// What a picture cost, in seconds of processor time over all threads.
+// Cost of rendering: processor seconds over all threads.
 struct TraceCost {
   int64_t rays = 0;
   double ray_seconds = 0;
@@ -27,12 +27,12 @@ struct TraceCost {
   TraceCost& operator+=(const TraceCost& other);
 };
 
-// Pictures of a mesh by ray casting with Embree, lit as surface_shader.h says. The same bits for any number of threads
-// and on all x86 machines with AVX2: Embree is held to that instruction set, and its tree is built by one thread,
-// because which of two coincident surfaces is met first depends on the tree.
+// Renders a mesh by ray casting with Embree, lit as in surface_shader.h. The same bits for any number of threads and on
+// all x86 machines with AVX2: Embree is limited to that instruction set, and one thread builds its tree, which decides
+// which of two coincident surfaces is hit first.
 class RayTracer {
  public:
-  // Errors (kBadArgument): an invalid mesh, no triangles, more than Embree can number; kIo: Embree does not start.
+  // Errors: kBadArgument: an invalid mesh, no triangles, more than Embree can number; kIo: Embree does not start.
   static Result<RayTracer> Create(Mesh mesh);
   RayTracer(RayTracer&&) noexcept;
   RayTracer& operator=(RayTracer&&) noexcept;
@@ -40,14 +40,15 @@ class RayTracer {
 
   const Mesh& mesh() const;
 
-  // The view of `camera`: rgba, 0–1, straight alpha. Alpha is the fraction of the pixel's rays that met the object, rgb
-  // the mean of what those saw, so that rgb·a + background·(1−a) is the picture over any background. rgb is 0 where
-  // alpha is. Errors (kBadArgument): impossible size, samples out of 1–16.
+  // Renders `camera`'s view: rgba, 0–1, straight alpha. Alpha is the fraction of a pixel's rays that hit the object,
+  // rgb the mean of their colours, so rgb·a + background·(1−a) is the picture over any background. rgb is 0 where alpha
+  // is.
+  // Errors (kBadArgument): impossible size; samples not in 1–16.
   Result<Image> Render(const Camera& camera, const TraceOptions& options = {}, TraceCost* cost = nullptr) const;
 
-  // For each point of the surface the first of `eyes`, counted from a start that changes from point to point, from
-  // which nothing hides it, and its colour from there; `sample_area` as in SampleFootprint. Eye −1 where all are
-  // blocked or the point lies in a hole.
+  // For each surface point, the first of `eyes` that sees it and its colour from there. The search starts at an eye
+  // that varies from point to point. Eye −1 if all are blocked or the point is in a hole. `sample_area`: see
+  // SampleFootprint.
   struct Sighting {
     int eye = -1;
     std::array<float, 3> color = {0, 0, 0};
@@ -56,7 +57,7 @@ class RayTracer {
                                      float sample_area) const;
   std::array<float, 3> Position(const SurfacePoint& point) const;  // world
 
-  // Whether anything stands between two places; what is at the places themselves does not count.
+  // Whether anything lies strictly between two positions.
   bool IsBlocked(const std::array<float, 3>& from, const std::array<float, 3>& to) const;
 
  private:

@@ -16,8 +16,9 @@ uint32_t Big(std::string_view bytes, size_t at, size_t size) {
   return value;
 }
 
-// One run-length encoded row: a count with the top bit set copies that many values, without it repeats one; 0 ends.
-// False when the row ends early or holds too much.
+// Decodes a run-length encoded row: a count with the top bit set precedes that many values, without it a value to
+// repeat;
+// 0 ends. False if the row is too short or too long.
 bool Unpack(std::string_view packed, size_t sample, std::vector<uint8_t>& row) {
   size_t at = 0, filled = 0;
   while (at + sample <= packed.size()) {
@@ -58,7 +59,7 @@ Result<SgiImage> DecodeSgi(const std::string& where, std::string_view bytes, int
   }
   if (static_cast<int64_t>(width * height) > max_pixels) return bad(6, "more pixels than a texture may have");
   const size_t rows = height * channels;
-  // A packed row takes two bytes for 127 values at least; a plain one has its size. Checked before memory is asked for.
+  // A packed row takes at least two bytes per 127 values, a raw one its size. Checked before allocating.
   const size_t tables = packed ? rows * 8 : 0;
   const size_t least = kHeader + tables + (packed ? 0 : rows * width * sample);
   if (bytes.size() < least) return bad(bytes.size(), Cat("the file ends before byte ", least));
@@ -69,7 +70,7 @@ Result<SgiImage> DecodeSgi(const std::string& where, std::string_view bytes, int
   image.rgba.assign(width * height * 4, 255);
   std::vector<uint8_t> row(width);
   for (size_t c = 0; c < channels; ++c) {
-    // Grey fills r, g and b; the last of two or four channels is alpha.
+    // Grey fills r, g and b; the second of two or fourth of four channels is alpha.
     const bool alpha = (channels == 2 && c == 1) || c == 3;
     for (size_t y = 0; y < height; ++y) {
       const size_t r = c * height + y;
@@ -85,7 +86,7 @@ Result<SgiImage> DecodeSgi(const std::string& where, std::string_view bytes, int
           row[x] = static_cast<uint8_t>(bytes[kHeader + (r * width + x) * sample]);
         }
       }
-      uint8_t* out = image.rgba.data() + (height - 1 - y) * width * 4;  // the file begins at the bottom
+      uint8_t* out = image.rgba.data() + (height - 1 - y) * width * 4;  // files start at the bottom
       for (size_t x = 0; x < width; ++x) {
         if (alpha) {
           out[4 * x + 3] = row[x];

@@ -9,8 +9,8 @@
 
 namespace anchorsplat {
 
-// A picture of Silicon Graphics' format (.rgb, .rgba, .sgi, .bw), the usual texture beside AC3D models: big-endian,
-// plain or run-length encoded, 8 bits (16 bits are cut to the upper 8), 1–4 channels: grey, grey + alpha, rgb, rgba.
+// Silicon Graphics picture format (.rgb, .rgba, .sgi, .bw), common for AC3D textures: big-endian, raw or run-length
+// encoded, 8 bits (16 bits are cut to the upper 8), 1–4 channels: grey, grey + alpha, rgb, rgba.
 struct SgiImage {
   int width = 0;
   int height = 0;
@@ -19,8 +19,8 @@ struct SgiImage {
 
 bool IsSgi(std::string_view bytes);
 
-// Errors (kBadFile, beginning with `where` and the byte): not the format, more than `max_pixels`, rows that lie outside
-// the file or do not fill their line.
+// Errors (kBadFile, starting with `where` and the byte): another format; more than `max_pixels`; rows outside the file
+// or of the wrong length.
 Result<SgiImage> DecodeSgi(const std::string& where, std::string_view bytes, int64_t max_pixels);
 
 }  // namespace anchorsplat

@@ -28,7 +28,7 @@ Vec3d UnitOrZero(const Vec3d& a) {
 
 void FillSmoothNormals(std::span<const Vec3> corners, float angle_degrees, std::vector<Vec3>& normals) {
   const size_t count = corners.size();
-  std::vector<uint32_t> missing;  // corners to fill
+  std::vector<uint32_t> missing;  // corners without normal
   for (size_t i = 0; i < count; ++i) {
     const Vec3& n = normals[i];
     if (n[0] == 0 && n[1] == 0 && n[2] == 0) missing.push_back(static_cast<uint32_t>(i));
@@ -47,10 +47,10 @@ void FillSmoothNormals(std::span<const Vec3> corners, float angle_degrees, std::
     }
   }
 
-  // Groups of equal positions by sorting; ties by index, so that sums have one order everywhere.
+  // Sorting groups equal positions; ties by index give sums the same order everywhere.
   std::sort(missing.begin(), missing.end(),
             [&](uint32_t a, uint32_t b) { return corners[a] != corners[b] ? corners[a] < corners[b] : a < b; });
-  // A hair wider: faces at exactly the angle belong together whatever the rounding.
+  // Slightly wider, so that faces at exactly the angle are joined despite rounding.
   const double least = std::cos(double{angle_degrees} * std::acos(-1.0) / 180) - 1e-6;
   for (size_t begin = 0; begin < missing.size();) {
     size_t end = begin + 1;

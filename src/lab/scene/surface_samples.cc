@@ -11,10 +11,10 @@ namespace {
 
 constexpr size_t kEyes = 32;
 constexpr int64_t kBatch = 4096;
-// Of an object of which a fiftieth is visible, the rest being inside, all points asked for are found.
+// Enough to find all requested points if a fiftieth of the surface is visible.
 constexpr int64_t kDrawsPerPoint = 50;
 
-// Areas of the triangles, summed up: a uniform number below the total lands in a triangle in proportion to its area.
+// Cumulative triangle areas: a uniform number below the total selects triangles in proportion to area.
 std::vector<double> CumulativeAreas(const Mesh& mesh) {
   std::vector<double> sums;
   sums.reserve(mesh.triangles.size());
@@ -38,7 +38,7 @@ SurfacePoint DrawPoint(const std::vector<double>& sums, Random& random) {
   SurfacePoint point;
   point.triangle = static_cast<uint32_t>(std::min<ptrdiff_t>(found - sums.begin(), std::ssize(sums) - 1));
   double u = random.Uniform(), v = random.Uniform();
-  if (u + v > 1) {  // the other half of the parallelogram
+  if (u + v > 1) {  // mirrors the other half of the parallelogram
     u = 1 - u;
     v = 1 - v;
   }

@@ -9,15 +9,14 @@
 
 namespace anchorsplat {
 
-// A point of the surface as a view would find it: what structure from motion gives for photographs, without its errors.
+// A visible surface point, as structure from motion would reconstruct it, without errors.
 struct SurfaceSample {
   std::array<float, 3> position;
-  std::array<float, 3> color;  // 0–1, lit, as the cameras see it
+  std::array<float, 3> color;  // 0–1, lit, as cameras see it
 };
 
-// Up to `count` points spread evenly over the area that at least one of `cameras` sees (32 of them are asked, evenly
-// chosen). Fewer come back when hardly anything of the mesh is visible. Deterministic for a seed. No cameras, no
-// points.
+// Samples up to `count` points evenly by area from the surface visible to at least one camera (tests 32 evenly chosen
+// ones). Returns fewer if hardly anything is visible, none without cameras. Deterministic for a seed.
 std::vector<SurfaceSample> SampleSurface(const RayTracer& tracer, const CameraSet& cameras, int64_t count,
                                          uint64_t seed);
 

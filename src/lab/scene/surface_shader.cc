@@ -12,7 +12,7 @@ namespace {
 
 using Vec3 = std::array<float, 3>;
 
-// Unit length; `fallback` where there is no direction.
+// Unit vector, or `fallback` for a zero vector.
 Vec3 Normalized(const Vec3& a, const Vec3& fallback) {
   const float square = Dot(a.data(), a.data());
   if (!(square > 0) || !std::isfinite(square)) return fallback;
@@ -20,7 +20,6 @@ Vec3 Normalized(const Vec3& a, const Vec3& fallback) {
   return {a[0] * scale, a[1] * scale, a[2] * scale};
 }
 
-// Colours of a file may be anything.
 // Twice the area times the unit normal, in double: triangles may be tiny.
 std::array<double, 3> CrossOfEdges(const Vec3& a, const Vec3& b, const Vec3& c) {
   const std::array<double, 3> e = {double{b[0]} - a[0], double{b[1]} - a[1], double{b[2]} - a[2]};
@@ -48,7 +47,7 @@ SurfaceShader::SurfaceShader(const Mesh& mesh) : mesh_(mesh) {
     out.material = mesh.triangle_materials[t];
     const auto cross = CrossOfEdges(mesh.positions[corners[0]], mesh.positions[corners[1]], mesh.positions[corners[2]]);
     const double twice_area = std::sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]);
-    Vec3 face = {0, 1, 0};  // of a triangle without area, which no ray meets
+    Vec3 face = {0, 1, 0};  // for a triangle without area, which no ray hits
     if (twice_area > 0 && std::isfinite(twice_area)) {
       for (size_t k = 0; k < 3; ++k) face[k] = static_cast<float>(cross[k] / twice_area);
     }
@@ -79,7 +78,7 @@ bool SurfaceShader::HasHoles(uint32_t triangle) const {
 }
 
 float SurfaceShader::TexelsUnder(const Triangle& triangle, const Vec3& direction, float footprint) const {
-  // Along a surface seen edge-on the footprint has no end; the level is clamped to the coarsest then.
+  // Edge-on, the footprint is unbounded; the level is then clamped to the coarsest.
   const float cosine = std::max(std::abs(Dot(triangle.face, direction.data())), 1e-12f);
   return triangle.texel_density * footprint / cosine;
 }

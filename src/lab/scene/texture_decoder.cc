@@ -13,7 +13,7 @@
 #include "io/file_bytes.h"
 #include "scene/sgi_image.h"
 
-// Only the two formats that need it: the others have readers that are looked after better.
+// Only for the two formats that need it; for the others there are better maintained readers.
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
 #define STBI_ONLY_BMP
@@ -56,7 +56,7 @@ Result<Texture> FromFloats(const std::string& name, const Image& image) {
 Result<Texture> ThroughFile(const std::string& name, const std::string& bytes, int64_t max_pixels,
                             Result<ImageSize> (*decode_size)(std::FILE*, const std::string&, uint64_t),
                             DecodeFile decode) {
-  // fmemopen only reads what is opened for reading.
+  // fmemopen does not write when opened for reading.
   const FileHandle file(fmemopen(const_cast<char*>(bytes.data()), bytes.size(), "rb"));
   if (file == nullptr) return Error{ErrorCode::kIo, Cat(name, ": cannot be opened in memory")};
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ImageSize size, decode_size(file.get(), name, bytes.size()));
@@ -75,7 +75,7 @@ Result<Texture> ThroughStb(const std::string& name, const std::string& bytes, in
   if (stbi_info_from_memory(data, size, &width, &height, &channels) == 0 || width < 1 || height < 1) {
     return Error{ErrorCode::kBadFile, Cat(name, ": cannot be decoded (", stbi_failure_reason(), ")")};
   }
-  // Run-length encoding packs 128 pixels into two bytes at best; what promises more is a bomb.
+  // Run-length encoding packs at most 128 pixels into two bytes; more is a decompression bomb.
   const int64_t pixels = int64_t{width} * height;
   if (pixels > max_pixels || pixels > 128 * int64_t{size}) {
     return Error{ErrorCode::kBadFile, Cat(name, ": ", width, " x ", height, " pixels are too many")};

@@ -8,11 +8,11 @@ namespace anchorsplat {
 
 namespace {
 
-// The source texels that target texel i of `to` covers, when `from` texels shrink to `to`, and how much of each.
+// Source texels covered by target texel i when `from` texels become `to`, with weights.
 struct Span {
   int first = 0;
   int count = 0;
-  float weight[4] = {};  // from/to is below 3 + rounding, so that at most four are touched
+  float weight[4] = {};  // from/to is below 3 plus rounding, so at most four are touched
 };
 
 std::vector<Span> SpansOf(int from, int to) {
@@ -76,7 +76,7 @@ TexturePyramid::Level TexturePyramid::Halved(const Level& from) {
 
 TexturePyramid::Taps TexturePyramid::FindTaps(float u, float v, int level) const {
   const Level& from = levels_[static_cast<size_t>(std::clamp(level, 0, levels() - 1))];
-  // Texel centres lie at ½, v counts from below and rows from above.
+  // Texel centres are at ½; v increases upwards, rows downwards.
   const float x = (u - std::floor(u)) * static_cast<float>(from.width) - 0.5f;
   const float y = (1 - (v - std::floor(v))) * static_cast<float>(from.height) - 0.5f;
   const int left = static_cast<int>(x + 1) - 1;  // floor: x ≥ −½

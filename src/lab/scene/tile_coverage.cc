@@ -30,8 +30,8 @@ TileCoverage::TileCoverage(const Mesh& mesh, const Camera& camera, int tile_size
     vertices[i] = {k.fx * c[0] / c[2] + k.cx, k.fy * c[1] / c[2] + k.cy, c[2]};
   }
 
-  constexpr double kMargin = 0.0625;  // pixels: rays are made in single precision
-  constexpr double kNear = 1e-4;      // closer than this, a projection says little about where the triangle is
+  constexpr double kMargin = 0.0625;  // pixels; rays are computed in single precision
+  constexpr double kNear = 1e-4;      // below this depth a projection is unreliable
   for (const auto& triangle : mesh.triangles) {
     double low[2] = {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
     double high[2] = {-low[0], -low[1]};

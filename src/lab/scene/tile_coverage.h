@@ -8,8 +8,8 @@
 
 namespace anchorsplat {
 
-// Which square tiles of a view the mesh may touch: every tile that the box around some projected triangle meets, so
-// that rays need not be sent where they cannot hit. Never too few.
+// Conservative test of which square tiles of a view the mesh may touch: those that meet the bounding box of a projected
+// triangle. Rays are only sent there.
 class TileCoverage {
  public:
   TileCoverage(const Mesh& mesh, const Camera& camera, int tile_size);

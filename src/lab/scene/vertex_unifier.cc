@@ -14,7 +14,7 @@ using Key = std::array<uint32_t, 12>;
 struct KeyHash {
   size_t operator()(const Key& key) const {
     uint64_t hash = 0x9e3779b97f4a7c15;
-    for (const uint32_t word : key) {  // splitmix64's finaliser, word by word
+    for (const uint32_t word : key) {  // splitmix64's finaliser per word
       hash ^= word;
       hash = (hash ^ (hash >> 30)) * 0xbf58476d1ce4e5b9;
       hash = (hash ^ (hash >> 27)) * 0x94d049bb133111eb;

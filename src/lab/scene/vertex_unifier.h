@@ -8,8 +8,8 @@
 
 namespace anchorsplat {
 
-// A mesh corner by corner, three for each triangle, nothing shared. All vectors have 3T elements, materials
-// T; uvs and colors are empty where the mesh has none.
+// A mesh without shared vertices, three corners per triangle. Vectors have 3T elements, materials T; uvs and colors are
+// empty if the mesh has none.
 struct MeshCorners {
   std::vector<std::array<float, 3>> positions;
   std::vector<std::array<float, 3>> normals;
@@ -20,11 +20,11 @@ struct MeshCorners {
   bool has_colors = false;
 };
 
-// The same triangles in the same order, with corners that agree in every bit made one vertex. Vertices are in the order
-// of their first corner. Materials and textures stay empty.
+// Merges corners that are equal in every bit into vertices. Triangles keep their order; vertices are in order of their
+// first corner. Materials and textures stay empty.
 Mesh UnifyVertices(const MeshCorners& corners);
 
-// Drops the materials no triangle uses and the textures no material uses, keeping the order of the others.
+// Drops materials without triangles and textures without materials; keeps the others' order.
 void RemoveUnusedMaterials(Mesh& mesh);
 
 }  // namespace anchorsplat

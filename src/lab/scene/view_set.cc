@@ -31,7 +31,7 @@ Status MakeFolder(const fs::path& folder) {
   return {};
 }
 
-// Names of the pictures as seen from `prefix`.
+// Prefixes picture names.
 CameraSet WithPrefix(CameraSet cameras, const std::string& prefix) {
   for (Camera& camera : cameras.cameras) camera.name = prefix + camera.name;
   return cameras;
@@ -96,7 +96,7 @@ Result<Image> RenderView(const RayTracer& tracer, const Camera& camera, const Vi
 Result<Image> RenderStoredView(const RayTracer& tracer, const Camera& camera, const ViewSetOptions& options,
                                TraceCost* cost) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(Image image, RenderView(tracer, camera, options, cost));
-  for (float& x : image.pixels) x = std::floor(x * 255.0f + 0.5f) / 255.0f;  // as PNGs are written and read
+  for (float& x : image.pixels) x = std::floor(x * 255.0f + 0.5f) / 255.0f;  // as after writing and reading a PNG
   return image;
 }
 
@@ -128,14 +128,14 @@ Result<ViewSetCost> WriteViews(const RayTracer& tracer, const fs::path& folder, 
   ANCHORSPLAT_RETURN_IF_ERROR(WritePoints(tracer, sparse, cameras.low, options, write));
   cost.point_seconds = points_watch.Total();
 
-  // Whole views side by side: nothing waits for anything, and each view is the same whoever makes it.
+  // Views are rendered in parallel and independently, so each is the same whatever the threads.
   const int64_t views = std::ssize(cameras.low.cameras);
   const int64_t pictures = options.store_high ? 2 * views : views;
   Progress progress("views", pictures);
   std::mutex mutex;
   Status failed;
   ParallelFor(0, pictures, 1, [&](int64_t i, int64_t) {
-    // The large ones first, so that no thread is left with a large one at the end.
+    // Large views first, so that no thread is left with one at the end.
     const bool is_high = options.store_high && i < views;
     const Camera& camera = (is_high ? cameras.high : cameras.low).cameras[static_cast<size_t>(i % views)];
     {

@@ -54,7 +54,7 @@ void DropGaussians(double share, Random& random, AugmentedScene& scene) {
     sizes.push_back(scene.pixel_sizes[static_cast<size_t>(i)]);
   }
   if (rows.empty()) return;
-  auto kept = Subset(scene.cloud, rows);  // rows in range: cannot fail
+  auto kept = Subset(scene.cloud, rows);  // cannot fail: rows are in range
   scene.cloud = *std::move(kept);
   scene.pixel_sizes = std::move(sizes);
 }
@@ -88,9 +88,8 @@ void RotateWorld(const std::array<double, 4>& q, AugmentedScene& scene) {
   }
 }
 
-// With M = diag(−1, 1, 1), means become M·p. Covariances M·R·S·Sᵀ·Rᵀ·M are those of the rotation M·R·M, because S is
-// diagonal. A mirrored camera would be left-handed, so the picture is mirrored too: F·R·M with F = M is a rotation
-// again.
+// With M = diag(−1, 1, 1), means become M·p. Covariances M·R·S·Sᵀ·Rᵀ·M have rotation M·R·M, because S is diagonal. A
+// mirrored camera would be left-handed, so pictures are mirrored too: F·R·M with F = M is a rotation again.
 void MirrorWorld(AugmentedScene& scene) {
   const ShRotation harmonics({-1, 0, 0, 0, 1, 0, 0, 0, 1});
   GaussianCloud& cloud = scene.cloud;
@@ -105,7 +104,7 @@ void MirrorWorld(AugmentedScene& scene) {
   for (size_t v = 0; v < scene.cameras.size(); ++v) {
     Camera& camera = scene.cameras[v];
     Pose& pose = camera.world_to_camera;
-    for (const size_t k : {1, 2, 3, 6}) pose.rotation[k] *= -1;  // F on the left, M on the right
+    for (const size_t k : {1, 2, 3, 6}) pose.rotation[k] *= -1;  // F from the left, M from the right
     pose.translation[0] *= -1;
     camera.intrinsics.cx = camera.intrinsics.width - camera.intrinsics.cx;
     FlipLeftRight(scene.truth[v]);
@@ -128,7 +127,7 @@ void ChangeColors(const std::array<size_t, 3>& order, const std::array<double, 3
   for (int64_t k = 0; k < coefficients; ++k) {
     float* sh = cloud.sh.data() + 3 * k;
     const float old[3] = {sh[0], sh[1], sh[2]};
-    // colour = max(Σ c·Y + 0.5, 0), and a factor above 0 passes through the maximum; the 0.5 goes into DC.
+    // colour = max(Σ c·Y + 0.5, 0). A positive factor passes through the maximum; the 0.5 goes into the DC.
     const bool dc = k % cloud.coefficients() == 0;
     for (size_t c = 0; c < 3; ++c) {
       const double moved = dc ? 0.5 * (gain[c] - 1) / static_cast<double>(kSh0) : 0;
@@ -152,7 +151,7 @@ void ChangeColors(const std::array<size_t, 3>& order, const std::array<double, 3
 void Augment(const AugmentationConfig& config, Random& random, AugmentedScene& scene) {
   if (config.drop > 0) DropGaussians(random.Uniform(0, config.drop), random, scene);
   if (config.rotate) {
-    // Four normal numbers are a uniform rotation.
+    // A normalised vector of four normal numbers is a uniform rotation.
     RotateWorld({random.Normal(), random.Normal(), random.Normal(), random.Normal()}, scene);
   }
   if (config.mirror && random.Uniform() < 0.5) MirrorWorld(scene);
@@ -165,7 +164,7 @@ void Augment(const AugmentationConfig& config, Random& random, AugmentedScene& s
       }
     }
     std::array<double, 3> gain = {1, 1, 1};
-    // A gain of 0 would leave nothing to see.
+    // Gains of 0 would leave nothing visible.
     if (config.gain > 0) {
       for (double& g : gain) g = std::max(0.05, 1 - config.gain * random.Uniform());
     }

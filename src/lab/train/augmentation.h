@@ -11,7 +11,7 @@
 
 namespace anchorsplat {
 
-// A splat with the views it should look like from.
+// A splat and the views that it should match.
 struct AugmentedScene {
   GaussianCloud cloud;
   Buffer<float> pixel_sizes;  // [N]
@@ -20,16 +20,15 @@ struct AugmentedScene {
   std::vector<TrueView> truth;  // one per camera
 };
 
-// Changes splat and views together, so that a perfect splat stays perfect, except for Gaussians that are dropped and
-// noise on opacities, on p_LR and on f: those are errors that the network should be able to live with. What is drawn
-// depends on `random` alone.
+// Changes splat and views consistently, so that a perfect splat stays perfect; except for dropped Gaussians and noise
+// on opacities, p_LR and f, errors that the network should tolerate. Draws depend on `random` alone.
 void Augment(const AugmentationConfig& config, Random& random, AugmentedScene& scene);
 
-// The parts of it.
+// The individual steps.
 void RotateWorld(const std::array<double, 4>& quaternion, AugmentedScene& scene);  // wxyz, not zero
 void MirrorWorld(AugmentedScene& scene);                                           // x becomes −x
 void ScaleWorld(double factor, AugmentedScene& scene);
-// Channel c becomes gain[c] times what channel order[c] was; gains in (0, 1].
+// New channel c is gain[c] times old channel order[c]; gains in (0, 1].
 void ChangeColors(const std::array<size_t, 3>& order, const std::array<double, 3>& gain, AugmentedScene& scene);
 
 }  // namespace anchorsplat

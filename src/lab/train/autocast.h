@@ -7,7 +7,7 @@
 
 namespace anchorsplat {
 
-// Automatic mixed precision while it lives.
+// Enables automatic mixed precision during its lifetime.
 class Autocast {
  public:
   Autocast(Precision precision, torch::Device device) : on_(precision != Precision::kFp32), type_(device.type()) {

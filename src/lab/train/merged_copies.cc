@@ -12,14 +12,14 @@ namespace {
 
 using torch::Tensor;
 
-constexpr double kLeastLength = 1e-4;  // of an axis, pixels: below, there is nothing that a gradient could see
-constexpr double kAlmostEqual = 1e-2;  // variances that differ by less than this share turn freely
-constexpr double kLeastClear = 0.02;   // 1 − opacity
+constexpr double kLeastLength = 1e-4;  // of an axis, pixels; shorter ones get no gradient
+constexpr double kAlmostEqual = 1e-2;  // relative difference of variances below which axes rotate freely
+constexpr double kLeastClear = 0.02;   // lower bound of 1 − opacity
 
-// What a value would change by: 0 that has its gradient.
+// Zero with the gradient of x.
 Tensor Change(const Tensor& x) { return x - x.detach(); }
 
-// [M,4] → [M,3,3], columns are the axes.
+// Quaternions [M,4] to rotations [M,3,3], whose columns are the axes.
 Tensor Rotation(const Tensor& quats) {
   const Tensor q = quats / quats.norm(2, 1, true).clamp_min(1e-12);
   const Tensor w = q.select(1, 0), x = q.select(1, 1), y = q.select(1, 2), z = q.select(1, 3);
@@ -30,14 +30,14 @@ Tensor Rotation(const Tensor& quats) {
       .view({-1, 3, 3});
 }
 
-// Mean over all directions of what a Gaussian covers, but for a constant: √(tr adj Σ).
+// Mean projected area over all directions up to a constant: √(tr adj Σ).
 Tensor Area(const Tensor& covariance, double dilation) {
   const Tensor dilated = covariance + dilation * torch::eye(3);
   const Tensor trace = dilated.diagonal(0, 1, 2).sum(1);
   return (0.5 * (trace.square() - dilated.square().sum({1, 2}))).clamp_min(1e-12).sqrt();
 }
 
-// q ⊗ (1, v): turned by the small rotation 2v about its own axes.
+// q ⊗ (1, v): rotated by the small rotation 2v in its own frame.
 Tensor Turned(const Tensor& q, const Tensor& v) {
   const Tensor w = q.select(1, 0), a = q.select(1, 1), b = q.select(1, 2), c = q.select(1, 3);
   const Tensor x = v.select(1, 0), y = v.select(1, 1), z = v.select(1, 2);
@@ -46,10 +46,10 @@ Tensor Turned(const Tensor& q, const Tensor& v) {
 }
 
 struct Merges {
-  GaussianCloud cloud;                // rows as the merge left them
-  std::vector<int64_t> alone;         // rows that stay as they were
-  std::vector<int64_t> merged;        // rows that others have become a part of
-  std::vector<int64_t> parts, whole;  // rows, and which of `merged` each is a part of
+  GaussianCloud cloud;                // rows after the merge
+  std::vector<int64_t> alone;         // unmerged rows
+  std::vector<int64_t> merged;        // rows that absorbed others
+  std::vector<int64_t> parts, whole;  // rows, and the index in `merged` that absorbed each
 };
 
 Merges Find(const GaussianTensors& all, const MergeRule& rule) {
@@ -65,8 +65,8 @@ Merges Find(const GaussianTensors& all, const MergeRule& rule) {
   std::vector<int64_t> into(rows);
   for (size_t row = 0; row < rows; ++row) into[row] = static_cast<int64_t>(row);
   std::vector<int64_t> parts_of(rows, 0), place(rows, -1);
-  // What goes without a trace is a part of nothing: its row is of those that do not stay.
-  plan.Carry(out.cloud, keep, &into);
+  // Dropped copies belong to no merged one; their rows are not kept.
+  plan.ApplyTo(out.cloud, keep, &into);
   for (size_t row = 0; row < rows; ++row) {
     if (keep[static_cast<size_t>(into[row])] != 0) ++parts_of[static_cast<size_t>(into[row])];
   }
@@ -111,7 +111,7 @@ GaussianTensors MergedCopies(const GaussianTensors& all, const MergeRule& rule) 
     return torch::zeros(shape).index_add(0, whole, of_parts);
   };
   const auto of_whole = [&](const Tensor& x) { return x.index_select(0, whole); };
-  // In pixels, from where the merged one is.
+  // In pixels, relative to the merged Gaussian.
   const double dilation = IsCompensated(rule.mode) ? 1e-3 : double{kDilation};
   const Tensor pixel_of_rows = rule.pixel_sizes.to(torch::kCPU, torch::kFloat32).repeat({rule.copies});
   const Tensor pixel = pixel_of_rows.index_select(0, index(merges.merged)).unsqueeze(1);
@@ -131,7 +131,7 @@ GaussianTensors MergedCopies(const GaussianTensors& all, const MergeRule& rule) 
   const Tensor axes = Rotation(out.quats);
   const Tensor inside = axes.transpose(1, 2).matmul(Change(spread)).matmul(axes);
   const Tensor variance = (out.log_scales.exp() / pixel).clamp_min(kLeastLength).square();
-  const auto turned = [&](int64_t i, int64_t j) {  // by how much axis j turns towards i
+  const auto turned = [&](int64_t i, int64_t j) {  // rotation of axis j towards i
     const Tensor a = variance.select(1, i), b = variance.select(1, j), difference = b - a;
     return inside.select(1, i).select(1, j) * difference / (difference.square() + (kAlmostEqual * (a + b)).square());
   };

@@ -9,20 +9,20 @@
 
 namespace anchorsplat {
 
-// Which copies are merged, as CopyChoice and CopyGroups have it.
+// Which copies to merge, as in CopyChoice and CopyGroups.
 struct MergeRule {
   int64_t copies = 1;         // K, of N Gaussians each, row k·N + i
   torch::Tensor pixel_sizes;  // [N] of the closer view, world units
   RenderMode mode = RenderMode::kClassic;
-  double cost = 0;  // what a merge may cost
+  double cost = 0;  // maximum cost of a merge
 };
 
-// What `enhance` leaves of a network's copies (model/compact/copy_choice.h), on the CPU: those that stay alone, then
-// those that others have been merged into. A network that learns through this says copies that merge well.
+// Merges a network's copies on the CPU as `enhance` does (model/compact/copy_choice.h): returns the unmerged ones, then
+// the merged ones. Training through this makes networks produce copies that merge well.
 //
-// The values are those of the merge itself. Its gradient is that of the copies' mass, mean and covariance, to first
-// order: of eigenvalues and eigenvectors as those of a matrix that changes a little, without the masses that copies
-// share and what the limit of 1/255 takes of them. Who merges with whom counts as given.
+// Values are exactly those of the merge. The gradient is that of the copies' mass, mean and covariance to first order
+// (eigenvalues and eigenvectors by perturbation theory), ignoring shared mass and the 1/255 limit. Which copies merge
+// is taken as constant.
 GaussianTensors MergedCopies(const GaussianTensors& all, const MergeRule& rule);
 
 }  // namespace anchorsplat

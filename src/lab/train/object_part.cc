@@ -10,11 +10,11 @@ namespace anchorsplat {
 
 namespace {
 
-// Windows do not become smaller than this, pixels a side: SSIM needs some, and a spot shows little else.
+// Minimum side of windows in pixels: SSIM needs some, and smaller ones show little besides the spot.
 constexpr int kLeastSide = 64;
-// How far a Gaussian shows, in standard deviations: an opaque one falls below 1/255 at 3.33.
+// Visible extent of a Gaussian in standard deviations: an opaque one falls below 1/255 at 3.33.
 constexpr double kReach = 3.4;
-// Added to that for what filter, dilation and crops do to it, pixels.
+// Added to it for filter, dilation and cropping, pixels.
 constexpr double kMargin = 4;
 
 struct Projected {
@@ -35,7 +35,7 @@ Projected Project(const GaussianCloud& cloud, int64_t row, double size, const Ca
   if (!(p[2] > double{kNear})) return {};
   const Pinhole& pinhole = camera.intrinsics;
   const double x = p[0] / p[2], y = p[1] / p[2];
-  // Seen at an angle a sphere becomes longer.
+  // Off-axis, a sphere's projection is elongated.
   const double stretch = std::sqrt(1 + x * x + y * y);
   return {pinhole.fx * x + pinhole.cx, pinhole.fy * y + pinhole.cy,
           kReach * std::max(pinhole.fx, pinhole.fy) * size / p[2] * stretch + kMargin, true};
@@ -56,7 +56,7 @@ PixelBox WindowAround(double x, double y, const Pinhole& pinhole, int side) {
   return {x0, y0, x0 + w, y0 + h};
 }
 
-// Windows of `side` around the spot in the part's views, and the Gaussians there.
+// Finds windows of `side` around the spot in each view, and the Gaussians visible there.
 void Look(const GaussianCloud& cloud, std::span<const Camera> cameras, const SeenGaussians& seen, int64_t spot,
           int side, ObjectPart& part) {
   part.windows.clear();
@@ -77,7 +77,7 @@ void Look(const GaussianCloud& cloud, std::span<const Camera> cameras, const See
       shows = shows || Inside(p, part.windows[v], p.reach);
       wanted = seen.In(part.views[v], i) && Inside(p, part.windows[v], 0);
     }
-    wanted = wanted || i == spot;  // a view may see it without its centre
+    wanted = wanted || i == spot;  // a view may show it without its centre
     if (wanted) {
       part.wanted.push_back(i);
     } else if (shows) {
@@ -114,8 +114,8 @@ ObjectPart ChoosePart(const GaussianCloud& cloud, std::span<const Camera> camera
   part.views.assign(order.begin(), order.end());
   std::stable_partition(part.views.begin() + 1, part.views.end(), [&](size_t view) { return seen.In(view, spot); });
   part.views.resize(std::min(part.views.size(), request.views));
-  // Where Gaussians are dense the windows become smaller: what is no copy of the network's is drawn as the filter makes
-  // it, and a window full of that shows the network's own behind a haze that will not be there in use.
+  // Where Gaussians are dense, windows shrink. Gaussians beyond `most` are drawn filtered, and a window full of those
+  // would show the network's own behind a haze that does not exist in use.
   int side = request.side;
   Look(cloud, cameras, seen, spot, side, part);
   while (side > kLeastSide && static_cast<int64_t>(part.wanted.size()) > request.most) {

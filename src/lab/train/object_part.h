@@ -12,26 +12,27 @@
 
 namespace anchorsplat {
 
-// A window of at most `side` pixels a side inside of a picture, around a random pixel of the object's box.
+// A window of at most `side` pixels in a picture, around a random pixel of the object's box.
 PixelBox RandomWindow(int width, int height, const PixelBox& object, int side, Random& random);
 
-// What a step looks at when it is about a part of an object: the same spot from several sides.
+// A part of an object for one step: the same spot from several sides.
 struct ObjectPart {
-  std::vector<size_t> views;      // of the object's
-  std::vector<PixelBox> windows;  // of each view, around the spot
-  std::vector<int64_t> wanted;  // Gaussians seen in a window, ascending; the nearest to the spot if there are too many
-  std::vector<int64_t> others;  // those that may show in a window besides, ascending
+  std::vector<size_t> views;      // indices of the object's views
+  std::vector<PixelBox> windows;  // in each view, around the spot
+  std::vector<int64_t>
+      wanted;  // Gaussians visible in a window, ascending; the nearest to the spot if there are too many
+  std::vector<int64_t> others;  // further ones that may be visible in a window, ascending
 };
 
 struct PartRequest {
-  size_t views = 1;  // at most
-  int side = 0;      // of a window, pixels; 0: the whole picture. Smaller, down to 64, where more than `most` are seen
-  int64_t most = 0;  // Gaussians wanted
+  size_t views = 1;  // maximum
+  int side = 0;      // of a window, pixels; 0: the whole picture. Reduced, down to 64, if more than `most` are visible
+  int64_t most = 0;  // maximum number of wanted Gaussians
 };
 
-// The spot is a random one of the Gaussians that the first view of `order` sees; the views are that one and then, in
-// their order, those that see the spot, too, before those that do not. `cameras` are all views of the object, of which
-// `order` has some, and `seen` knows these. `cloud` has values that are finite.
+// Picks a random Gaussian visible in the first view of `order` as the spot. Uses that view, then others in order, those
+// that see the spot first. `cameras`: all views of the object; `order`: some of them, known to `seen`. `cloud` must be
+// finite.
 ObjectPart ChoosePart(const GaussianCloud& cloud, std::span<const Camera> cameras, std::span<const size_t> order,
                       const SeenGaussians& seen, const PartRequest& request, Random& random);
 

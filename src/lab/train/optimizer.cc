@@ -86,10 +86,10 @@ void Optimizer::Step(double factor) {
     const torch::Tensor denominator = p.second.sqrt().div_(std::sqrt(second_bias)).add_(config_.epsilon);
     p.value.addcdiv_(p.first, denominator, -rate / first_bias);
   }
-  // Young averages forget quickly: the first steps are far from where they lead.
+  // Shorter memory at first: early steps are far from where they lead.
   const double keep = std::min(config_.ema, (1 + t) / (10 + t));
   for (Averaged& a : averaged_) {
-    // What a network keeps besides its parameters (counters, extremes, running statistics) is not for averaging.
+    // Non-parameters (counters, extremes, running statistics) are not averaged.
     if (config_.ema == 0 || !a.value.requires_grad()) {
       a.average.copy_(a.value);
     } else {

@@ -13,31 +13,31 @@
 
 namespace anchorsplat {
 
-// Adam (Kingma and Ba 2015, with decoupled weight decay) over the parameters of a network, a rate per group, and the
-// running average of the weights that validations and saved networks take. All state is in named
-// tensors, so that a checkpoint is a file of tensors.
+// Adam (Kingma and Ba 2015, with decoupled weight decay) on a network's parameters with a rate per group, and an
+// exponential moving average of the weights for validation and saving. All state is in named tensors, so a checkpoint
+// is a file of tensors.
 class Optimizer {
  public:
-  // Errors (kBadFile with the configuration's file): a rate for a group that the network does not have.
+  // Errors (kBadFile with the configuration's file): a rate for an unknown group.
   static Result<Optimizer> Make(TrainableNetwork& network, const TrainConfig& config);
 
   void ZeroGradients();
-  double GradientNorm() const;  // of all parameters that are trained; not finite when one value is not
+  double GradientNorm() const;  // over all trained parameters; not finite if a value is not
   void ScaleGradients(double factor);
-  // Gradients of trained parameters, each where autograd left it; parameters without one are given zeros.
+  // Gradients of trained parameters, shared with autograd; creates zeros where there is none.
   std::vector<torch::Tensor> Gradients();
 
-  // One update of weights and average. `factor` multiplies all rates.
+  // Updates weights and average. `factor` multiplies all rates.
   void Step(double factor);
   int64_t steps() const { return steps_; }
   void set_steps(int64_t steps) { steps_ = steps; }
 
-  // Exchanges weights and averages: before a validation or a Save, and again after it.
+  // Swaps weights and averages. Call before and after a validation or a Save.
   void SwapAverage();
 
-  // Every tensor that the rest of a training depends on, by name; they share memory with what is in use.
+  // All tensors a checkpoint needs, by name, sharing memory.
   std::vector<std::pair<std::string, torch::Tensor>> State() const;
-  int64_t parameters() const;  // numbers that are trained
+  int64_t parameters() const;  // number of trained values
 
  private:
   struct Trained {
@@ -56,7 +56,7 @@ class Optimizer {
   std::vector<Averaged> averaged_;  // parameters and buffers
 };
 
-// The factor of all learning rates. `progress` is the part of the training that is done, 0 to 1.
+// Factor of all learning rates. `progress`: elapsed share of the training, 0–1.
 double RateFactor(const OptimizerConfig& config, int64_t step, double progress);
 
 }  // namespace anchorsplat

@@ -11,17 +11,17 @@
 
 namespace anchorsplat {
 
-// LPIPS as a term of the loss: the mean distance of the parts of the views that `perceptual` of each truth names.
+// LPIPS as a loss term: mean distance over the views' `perceptual` regions.
 class PerceptualObjective {
  public:
-  // Errors: those of ReadLpipsWeights, looked for in LpipsFolder(): kNotFound says what to run.
+  // Errors: those of ReadLpipsWeights for LpipsFolder(); kNotFound says what to run.
   static Result<PerceptualObjective> Open(LpipsNet net);
   static Result<PerceptualObjective> Make(const LpipsWeights& weights);
 
-  // Differentiable in `rendered`; 0 when no view has a part to look at. Values above 1 count as 1.
+  // Differentiable in `rendered`; 0 if no view has a region. Clamps values above 1.
   torch::Tensor operator()(std::span<const torch::Tensor> rendered, std::span<const TrueView> truth) const;
 
-  // Of two whole pictures [3,H,W] with values 0–1, without gradient.
+  // Distance of two whole pictures [3,H,W] with values 0–1, without gradient.
   double Distance(const Image& a, const Image& b) const;
 
  private:

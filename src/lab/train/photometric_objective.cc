@@ -13,7 +13,7 @@ namespace anchorsplat {
 namespace {
 
 constexpr float kForegroundStep = 0.004f;
-constexpr double kSmallestMse = 1e-7;  // 70 dB: nothing more to win there
+constexpr double kSmallestMse = 1e-7;  // 70 dB; improvements beyond do not count
 
 int64_t CountForeground(const Image& rendered, const TrueView& truth) {
   const auto& bg = truth.background;
@@ -62,7 +62,7 @@ void EvaluateView(const torch::Tensor& picture, const TrueView& truth, const Los
   const double foreground = static_cast<double>(terms.foreground), values = 3.0 * static_cast<double>(clamped.plane());
   const bool windows_fit = std::min(width, height) >= kSsimTaps;
   const double windows = windows_fit ? 3.0 * (width - 2 * kSsimRadius) * (height - 2 * kSsimRadius) : 0;
-  // PhotometricLoss has means and weights that add up to one: `scale` times it is what we want.
+  // PhotometricLoss uses means and weights with sum one; `scale` converts.
   const double l1_part = weights.l1 / foreground * values;
   const double ssim_part = windows_fit ? weights.ssim / (3 * foreground) * windows : 0;
   const double scale = l1_part + ssim_part;
@@ -104,7 +104,7 @@ void EvaluateView(const torch::Tensor& picture, const TrueView& truth, const Los
       const int64_t at = (int64_t{c} * height + y) * width;
       const float *r = rendered + at, *b = target.pixels.data() + at, *g = gradient.pixels.data() + at;
       for (int x = box.x0; x < box.x1; ++x) {
-        // Above 1 the clamped value does not move.
+        // Clamped values have no gradient.
         to[at + x] = r[x] > 1 ? 0 : photometric * g[x] + square * (r[x] - b[x]);
       }
     }
@@ -113,8 +113,8 @@ void EvaluateView(const torch::Tensor& picture, const TrueView& truth, const Los
 
 class Objective : public torch::autograd::Function<Objective> {
  public:
-  // `gradients`: of the loss with respect to each of `rendered`; `loss` its value.
-  // Only a TensorList is looked through for what asks for gradients; the vector counts as one other argument.
+  // `gradients`: of the loss by each of `rendered`; `loss`: its value.
+  // autograd searches only a TensorList for tensors that require gradients; the vector counts as one other argument.
   static torch::Tensor forward(torch::autograd::AutogradContext* context, const torch::TensorList& /*rendered*/,
                                const torch::autograd::variable_list& gradients, double loss) {
     context->save_for_backward(gradients);
@@ -126,7 +126,7 @@ class Objective : public torch::autograd::Function<Objective> {
     const float factor = outer[0].item<float>();
     const auto gradients = context->get_saved_variables();
     for (const torch::Tensor& gradient : gradients) result.push_back(factor == 1 ? gradient : gradient * factor);
-    result.resize(gradients.size() + 2);  // of the vector and of the number
+    result.resize(gradients.size() + 2);  // no gradient for the vector and the number
     return result;
   }
 };
@@ -144,13 +144,13 @@ PhotometricLossSum PhotometricObjective(std::span<const torch::Tensor> rendered,
       throw std::invalid_argument("a rendered view has another size than the true one");
     }
     inputs.push_back(rendered[v].contiguous());
-    // Not in the loop below: LibTorch has threads of its own.
+    // Outside the parallel loop below, because LibTorch has threads of its own.
     views[v].gradient = torch::zeros(rendered[v].sizes(), torch::kFloat32);
   }
   {
     const torch::NoGradGuard no_gradient;
     ParallelFor(0, static_cast<int64_t>(views.size()), 1, [&](int64_t v, int64_t) {
-      const torch::NoGradGuard also_here;  // the guard is of a thread
+      const torch::NoGradGuard also_here;  // guards are per thread
       EvaluateView(inputs[static_cast<size_t>(v)], truth[static_cast<size_t>(v)], weights,
                    views[static_cast<size_t>(v)]);
     });

@@ -13,7 +13,7 @@
 
 namespace anchorsplat {
 
-// What a rendered view should look like.
+// Target of a rendered view.
 struct TrueView {
   Image picture;                      // [3,H,W], over the background
   std::array<float, 3> background{};  // that the render has, too
@@ -22,15 +22,14 @@ struct TrueView {
   Buffer<uint8_t> ignored;  // [H,W] not 0: the picture says nothing there; empty: it says something everywhere
 };
 
-// The terms of one view, for people. With d = min(render, 1) − truth, W·H pixels of three channels, and F the
-// foreground: pixels where the truth differs from its background by more than 0.004 (one step of 8 bits) in a channel
-// or the render differs from it at all,
-//   l1      Σ|d| / F                        three channels together, as AnchorSplat's release counts it
-//   ssim    Σ(1 − SSIM) / 3F                over windows that lie inside the picture
+// Loss terms of one view, for the log. With d = min(render, 1) − truth, W·H pixels of three channels, and F the number
+// of foreground pixels: those where the truth differs from its background by more than 0.004 (one 8-bit step) in a
+// channel, or the render differs from it at all,
+//   l1      Σ|d| / F                        sum over channels, as in AnchorSplat's release
+//   ssim    Σ(1 − SSIM) / 3F                over windows inside the picture
 //   mse     Σd² / 3F
-//   log_mse ln(Σd² / 3WH + 1e-7)            PSNR up to a factor, so every view counts alike however hard it is
-// A mean over the foreground does not depend on how much empty space is around an object. Views without foreground are
-// left out.
+//   log_mse ln(Σd² / 3WH + 1e-7)            PSNR up to a factor, so that easy and hard views count alike
+// Means over the foreground do not depend on the empty space around an object. Views without foreground are left out.
 struct PhotometricTerms {
   double total = 0;
   double l1 = 0, ssim = 0, mse = 0, log_mse = 0;
@@ -39,13 +38,13 @@ struct PhotometricTerms {
 };
 
 struct PhotometricLossSum {
-  torch::Tensor loss;                   // the mean of `total` over the views with foreground; 0 when there are none
+  torch::Tensor loss;                   // mean of `total` over views with foreground; 0 without any
   std::vector<PhotometricTerms> terms;  // per view
 };
 
-// The weighted sum of the terms and, in the same pass, its gradient; one view per thread. `rendered` are [3,H,W] on the
+// Computes the weighted sum of the terms together with its gradient; one view per thread. `rendered`: [3,H,W] on the
 // CPU, of the sizes of `truth`. The same bits for any number of threads. Pictures with a side below 11 pixels have no
-// SSIM. Throws std::invalid_argument when sizes differ: an error of the caller.
+// SSIM. Throws std::invalid_argument for different sizes, a caller's error.
 PhotometricLossSum PhotometricObjective(std::span<const torch::Tensor> rendered, std::span<const TrueView> truth,
                                         const LossConfig& weights);
 

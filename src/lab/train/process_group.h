@@ -8,22 +8,21 @@
 
 namespace anchorsplat {
 
-// The processes of one training, which add up their gradients: on one machine or several, on CPUs (Gloo).
+// The processes of a distributed training, which sum their gradients: on one or several machines, on CPUs (Gloo).
 class ProcessGroup {
  public:
   virtual ~ProcessGroup() = default;
 
-  // From the environment as torchrun sets it: WORLD_SIZE, RANK, MASTER_ADDR, MASTER_PORT. Null when WORLD_SIZE is not
-  // set or 1. Waits until all processes are there. Addresses of this machine alone keep to its loopback device.
-  // Errors: kBadArgument: a variable that is missing or no number; kIo: the others cannot be reached.
+  // From torchrun's environment: WORLD_SIZE, RANK, MASTER_ADDR, MASTER_PORT. Null if WORLD_SIZE is unset or 1. Waits
+  // for all processes. Addresses of this machine use its loopback device only.
+  // Errors: kBadArgument: a variable missing or not a number; kIo: the others cannot be reached.
   static Result<std::unique_ptr<ProcessGroup>> FromEnvironment();
 
   virtual int rank() const = 0;
   virtual int size() const = 0;
-  // Σ over all processes, in place, the same bits everywhere; for tensors of any device. Throws when another process is
-  // gone.
+  // Sums over all processes in place, to the same bits everywhere, on any device. Throws if another process is gone.
   virtual void Sum(torch::Tensor& tensor) = 0;
-  // The largest of all processes, element by element; else as Sum.
+  // Element-wise maximum over all processes; otherwise like Sum.
   virtual void Max(torch::Tensor& tensor) = 0;
 };
 

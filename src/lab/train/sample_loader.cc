@@ -23,7 +23,7 @@ uint64_t Stream(uint64_t seed, const char* purpose, int64_t index) {
   return StableHash(Cat(purpose, " ", index), seed);
 }
 
-// The first `count` places of a random order.
+// The first `count` elements in random order.
 template <typename Value>
 void PartialShuffle(std::vector<Value>& values, size_t count, Random& random) {
   for (size_t i = 0; i < count; ++i) {
@@ -31,13 +31,13 @@ void PartialShuffle(std::vector<Value>& values, size_t count, Random& random) {
   }
 }
 
-// Splat and views of a sample before they are changed.
+// Splat and views of a sample before augmentation.
 struct Chosen {
   AugmentedScene scene;
   std::shared_ptr<const SplatPart> part;  // null: the whole splat
 };
 
-// Whole views or random windows of them, and the whole splat.
+// Whole views or random crops, with the whole splat.
 Result<Chosen> ChooseWhole(const TrainConfig& config, const SamplePlan& plan, const TrainingObject& object,
                            Random& random) {
   Chosen chosen;
@@ -61,8 +61,8 @@ Result<Chosen> ChooseWhole(const TrainConfig& config, const SamplePlan& plan, co
   return chosen;
 }
 
-// Windows around a spot, and the splat there: first the rows that the network sees, then those that are drawn as they
-// are, which are filtered already: what changes the scene afterwards changes them alike.
+// Windows around a spot, and the splat there: first the network's rows, then those drawn filtered. Both undergo the
+// same augmentation.
 Result<Chosen> ChoosePartOf(const TrainConfig& config, const SamplePlan& plan, TrainingObject& object,
                             TrainableNetwork& network, Random& random) {
   if (!object.survey) {
@@ -129,7 +129,7 @@ SamplePlan PlanSample(const TrainConfig& config, int64_t index, size_t objects, 
   plan.object = PlannedObject(config.seed, index, objects);
   plan.seed = Stream(config.seed, "sample", index);
   plan.views = object.training;
-  // Of a part's views only the first is certain: the others are those that show the same spot.
+  // For a part only the first view is fixed; the others are those that show the same spot.
   const size_t count = config.data.part > 0
                            ? plan.views.size()
                            : std::min(plan.views.size(), static_cast<size_t>(config.data.views_per_step));
@@ -190,7 +190,7 @@ Result<TrainingSample> MakeSample(const TrainConfig& config, int64_t index, Obje
     sample.input.pixel_sizes = sample.input.pixel_sizes.narrow(0, 0, seen);
     sample.input.part = made->part;
   }
-  // Tables of the splat as it is serve every step, unless p_LR or f, which they may depend on, move.
+  // Unaugmented tables can be reused, unless p_LR or f, on which they may depend, vary.
   const AugmentationConfig& changes = config.augmentation;
   const bool reusable = !made->part && !changes.geometry() && changes.pixel_size_noise == 0 &&
                         changes.strength_noise == 0 && !changes.permute_colors && changes.gain == 0;
@@ -226,7 +226,7 @@ SampleLoader::SampleLoader(const TrainConfig& config, Order order, ObjectStore& 
       network_(network),
       device_(device),
       thread_([this, run = internal::CurrentRun()] {
-        const internal::JoinRun part(run);  // in what the training takes part in
+        const internal::JoinRun part(run);  // joins the training's run
         Run();
       }) {}
 
@@ -241,7 +241,7 @@ SampleLoader::~SampleLoader() {
 
 void SampleLoader::Run() {
   const torch::NoGradGuard no_gradient;
-  at::set_num_threads(1);  // of this thread: the others have better things to do
+  at::set_num_threads(1);  // for this thread; the others are busy
   for (int64_t index = order_.first;; ++index) {
     const int64_t place = index % order_.group;
     if (place < order_.offset || place >= order_.offset + order_.count) continue;
@@ -253,7 +253,7 @@ void SampleLoader::Run() {
     const auto make = [&]() -> Result<TrainingSample> {
       try {
         return MakeSample(config_, index, objects_, network_, device_);
-      } catch (const std::exception& failure) {  // LibTorch's and memory's
+      } catch (const std::exception& failure) {  // from LibTorch, or out of memory
         return Error{ErrorCode::kIo, failure.what()};
       }
     };
@@ -272,7 +272,7 @@ Result<TrainingSample> SampleLoader::Next() {
   std::unique_lock<std::mutex> lock(mutex_);
   changed_.wait(lock, [&] { return !ready_.empty(); });
   Result<TrainingSample> sample = std::move(ready_.front());
-  // An error stays in place: whoever asks again hears it again.
+  // An error stays in the queue, so further calls return it again.
   if (sample.ok()) {
     ready_.pop_front();
   } else {

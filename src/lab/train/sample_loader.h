@@ -19,39 +19,39 @@
 
 namespace anchorsplat {
 
-// One splat with the views that a step looks at.
+// A splat with the views of one step.
 struct TrainingSample {
   std::string object;
   NetworkInput input;           // prepared, on the network's device
-  std::vector<Camera> cameras;  // crops where the configuration says so
+  std::vector<Camera> cameras;  // cropped if configured
   std::vector<TrueView> truth;
-  // Of a part: what shows in the views besides, as the filter makes it. Drawn after the network's Gaussians. Undefined
-  // tensors when there is nothing.
+  // For parts: other Gaussians visible in the views, filtered, to be drawn after the network's. Undefined tensors if
+  // there are none.
   GaussianTensors others;
   RenderOptions render;
-  double seconds = 0;  // it took to make
+  double seconds = 0;  // to make it
 };
 
-// Which object and which of its views the sample with number `index` of a training is made of. Follows from seed and
-// index alone: a resumed training draws the same. Objects come in random order, all of them before any comes again.
+// Object and views of training sample number `index`. Depends on seed and index alone, so a resumed training draws the
+// same. Objects come in random order, each once per epoch.
 struct SamplePlan {
   size_t object = 0;
-  std::vector<size_t> views;  // of TrainingObject::views, all different; of a part all that training may see, shuffled
-  uint64_t seed = 0;          // of augmentation and crops
+  std::vector<size_t> views;  // distinct indices of TrainingObject::views; for parts, all training views, shuffled
+  uint64_t seed = 0;          // for augmentation and crops
 };
 size_t PlannedObject(uint64_t seed, int64_t index, size_t objects);
 SamplePlan PlanSample(const TrainConfig& config, int64_t index, size_t objects, const TrainingObject& object);
 
-// The network's input for a splat, or for one that was made of its Gaussians. `prepared` is left empty.
+// The network's input for a splat or an augmented scene. Leaves `prepared` empty.
 NetworkInput MakeInput(const TrainingObject& object, torch::Device device);
 NetworkInput MakeInput(const TrainingObject& object, const AugmentedScene& scene, torch::Device device);
 
-// The sample itself.
+// Makes the sample.
 Result<TrainingSample> MakeSample(const TrainConfig& config, int64_t index, ObjectStore& objects,
                                   TrainableNetwork& network, torch::Device device);
 
-// Makes samples ahead of time in a thread of its own: first, first + 1, … but of each `group` numbers (all processes'
-// samples of a step) only [offset, offset + count).
+// Makes samples ahead of time in a thread: first, first + 1, …, but of each `group` indices (the samples of all
+// processes in a step) only [offset, offset + count).
 class SampleLoader {
  public:
   struct Order {
@@ -64,7 +64,7 @@ class SampleLoader {
   SampleLoader(const SampleLoader&) = delete;
   SampleLoader& operator=(const SampleLoader&) = delete;
 
-  // The next one; waits for it if it must. After an error there are no more.
+  // Returns the next sample, waiting if necessary. After an error there are no more.
   Result<TrainingSample> Next();
 
  private:

@@ -7,8 +7,8 @@
 
 namespace anchorsplat {
 
-// The picture's sum is linear in a Gaussian's colour, with its weights as the factor: so the gradient of the sum with
-// respect to a coefficient tells them. All colours are made 0.5, where none is clamped.
+// The picture's sum is linear in a Gaussian's colour, with its summed weights as the factor. So the gradient of that
+// sum by a colour coefficient gives the weights. All colours are set to 0.5, where none is clamped.
 Result<SeenGaussians> SeenGaussians::Look(const GaussianCloud& cloud, std::span<const Camera> cameras,
                                           std::span<const size_t> views) {
   GaussianCloud grey = WithShDegree(cloud, 0);
@@ -27,7 +27,7 @@ Result<SeenGaussians> SeenGaussians::Look(const GaussianCloud& cloud, std::span<
     const Camera& camera = cameras[view];
     ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(grey, camera, options, output));
     one.color = Image(camera.intrinsics.width, camera.intrinsics.height, 3);
-    std::fill_n(one.color.pixels.begin(), one.color.plane(), 1.0f);  // of red alone
+    std::fill_n(one.color.pixels.begin(), one.color.plane(), 1.0f);  // red only
     std::fill(one.color.pixels.begin() + one.color.plane(), one.color.pixels.end(), 0.0f);
     one.box = {0, 0, camera.intrinsics.width, camera.intrinsics.height};
     ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Backward(grey, one, gradient));

@@ -11,24 +11,24 @@
 
 namespace anchorsplat {
 
-// Which Gaussians of a splat show in which views: those whose blending weights α·T over a picture's pixels add up to
-// more than kSeenPixels. Half of an object is behind the other half, so a view has nothing to say about it.
+// Which Gaussians of a splat are visible in which views: those whose blending weights α·T sum to more than kSeenPixels
+// over the picture. Half of an object is hidden in any view, which says nothing about it.
 inline constexpr double kSeenPixels = 0.05;
 
 class SeenGaussians {
  public:
-  // Renders those of `cameras` that `views` lists, in the splat's own mode; low resolution will do. Errors: those of
+  // Renders the listed `views` of `cameras` in the splat's own mode; low resolution suffices. Errors: those of
   // Rasterizer::Render and Backward.
   static Result<SeenGaussians> Look(const GaussianCloud& cloud, std::span<const Camera> cameras,
                                     std::span<const size_t> views);
 
   int64_t size() const { return count_; }
-  // `view` is one of those listed.
+  // Whether Gaussian `row` is visible in `view`, one of those listed.
   bool In(size_t view, int64_t row) const { return seen_[view][static_cast<size_t>(row)]; }
 
  private:
   int64_t count_ = 0;                    // N
-  std::vector<std::vector<bool>> seen_;  // by view, [N] or empty
+  std::vector<std::vector<bool>> seen_;  // by view: [N], or empty
 };
 
 }  // namespace anchorsplat

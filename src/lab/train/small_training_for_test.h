@@ -11,8 +11,8 @@
 
 namespace anchorsplat::test {
 
-// A data set of small coloured tetrahedra in three views of 64² pixels, made in a second or two: "a" and "b" under
-// train/, "c" under validation/.
+// A data set of small coloured tetrahedra in three views of 64² pixels, made in a second or two: "a" and "b" in train/,
+// "c" in validation/.
 class SmallTrainingSet {
  public:
   SmallTrainingSet() {
@@ -24,7 +24,7 @@ class SmallTrainingSet {
   std::filesystem::path validation() const { return folder_ / "validation"; }
   std::filesystem::path operator/(const std::string& name) const { return folder_ / name; }
 
-  // A recipe that is run in seconds, with more lines at its end.
+  // Writes a recipe that runs in seconds, with `more` lines at its end.
   std::filesystem::path Config(const std::string& name, const std::string& more) const {
     const std::filesystem::path path = folder_ / name;
     std::ofstream(path) << R"(
@@ -64,7 +64,7 @@ views_per_step = 2
     job.settings.views.low_size = 16;
     job.settings.views.high_size = 64;
     job.settings.views.points = 150;
-    job.settings.views.store_high = name != "b";  // "b" goes through the folder of true views
+    job.settings.views.store_high = name != "b";  // "b" exercises the folder of true views
     job.settings.fit_steps = 500;
     job.settings.max_gaussians = 300;
     job.settings.min_train_psnr = 1;

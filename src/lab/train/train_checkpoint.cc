@@ -14,7 +14,7 @@ namespace anchorsplat {
 namespace {
 
 constexpr const char* kFormat = "anchorsplat training 2";
-constexpr const char* kFormatBefore = "anchorsplat training 1";  // the same without a checksum: still read
+constexpr const char* kFormatBefore = "anchorsplat training 1";  // without checksum; still readable
 
 Status ReadTensor(const TensorFile& file, const std::string& name, torch::Tensor tensor) {
   const torch::NoGradGuard no_gradient;
@@ -64,7 +64,7 @@ Result<TensorFile> OpenCheckpoint(const std::filesystem::path& path) {
 }  // namespace
 
 Status WriteTrainCheckpoint(const std::filesystem::path& path, const Optimizer& optimizer, const TrainProgress& p) {
-  std::vector<torch::Tensor> kept;  // host copies, alive until they are written
+  std::vector<torch::Tensor> kept;  // host copies, kept until written
   std::vector<TensorEntry> entries;
   for (const auto& [name, tensor] : optimizer.State()) {
     const bool real = tensor.is_floating_point();

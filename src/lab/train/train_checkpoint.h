@@ -11,31 +11,31 @@
 
 namespace anchorsplat {
 
-// What a training has to remember besides tensors. Random numbers need no state: every draw follows from the seed and
-// the number of its step.
+// State of a training besides tensors. Random generators have none: every draw depends on the seed and its step.
 struct TrainProgress {
-  int64_t step = 0;  // steps begun, skipped ones included
+  int64_t step = 0;  // steps begun, including skipped ones
   int64_t optimizer_steps = 0;
   int64_t skipped = 0;
-  double seconds = 0;        // of all parts so far
-  double loss_scale = 1;     // of half precision
-  int64_t since_scaled = 0;  // good steps since it last changed
-  double best_psnr = 0;      // of the validations so far; 0: none
-  std::string settings;      // JSON: what must not change (Settings)
-  std::string objects;       // JSON: names of the training's objects
+  double seconds = 0;        // of all runs so far
+  double loss_scale = 1;     // for half precision
+  int64_t since_scaled = 0;  // successful steps since it last changed
+  double best_psnr = 0;      // of all validations so far; 0: none
+  std::string settings;      // JSON: what must stay the same (Settings)
+  std::string objects;       // JSON: names of the training objects
 };
 
-// All of it as a safetensors file with a checksum, whole or not at all; replaces an older one.
+// Writes everything as a safetensors file with checksum, atomically; replaces an existing one.
 Status WriteTrainCheckpoint(const std::filesystem::path& path, const Optimizer& optimizer,
                             const TrainProgress& progress);
 
-// Fills the optimizer's tensors, the network's weights among them. Errors: those of TensorFile; kBadFile: no such
-// checkpoint, a damaged one, or a tensor that is missing or of another shape; kBadArgument: settings or objects others
-// than those in `expected`, naming the first that differs.
+// Reads a checkpoint into the optimizer's tensors, including the network's weights. Errors: those of TensorFile;
+// kBadFile:
+// no such checkpoint, damaged, or a tensor missing or of the wrong shape; kBadArgument: settings or objects differ from
+// `expected` (names the first difference).
 Result<TrainProgress> ReadTrainCheckpoint(const std::filesystem::path& path, const TrainProgress& expected,
                                           Optimizer& optimizer);
 
-// Takes only the averaged weights of a checkpoint, as a start for another training of the same network.
+// Loads only the averaged weights of a checkpoint, to start another training of the same network.
 Status StartFromCheckpoint(const std::filesystem::path& path, Optimizer& optimizer);
 
 }  // namespace anchorsplat

@@ -20,7 +20,7 @@ constexpr uint64_t kMaxBytes = uint64_t{1} << 20;
 constexpr int64_t kManySteps = 1'000'000'000;
 constexpr double kMostUpscale = 64;
 
-// Takes the keys of one table; what nobody took is an error. The first complaint is kept.
+// Reads the keys of a table; unread keys are errors. Keeps the first error.
 class TableReader {
  public:
   TableReader(const std::string& file, const toml::table* table, std::string name)
@@ -93,7 +93,7 @@ class TableReader {
     }
     Complain(key, *table_->get(key), Cat("expected one of ", list, ", not \"", Printable(*word), "\""));
   }
-  // A table inside of this one.
+  // A table inside this one.
   TableReader Table(const char* key) {
     const toml::node* node = Take(key);
     if (node != nullptr && !node->is_table()) Complain(key, *node, Cat("expected a table [", key, "]"));
@@ -129,7 +129,7 @@ class TableReader {
   }
 
   const std::string& file_;
-  const toml::table* table_;  // null where the file has none
+  const toml::table* table_;  // null if the file has none
   std::string name_;
   std::set<std::string> taken_;
   Status first_;
@@ -343,7 +343,7 @@ nlohmann::json Settings(const TrainConfig& c) {
                          {"augmentation.drop", c.augmentation.drop},
                          {"augmentation.opacity_noise", c.augmentation.opacity_noise},
                          {"augmentation.pixel_size_noise", c.augmentation.pixel_size_noise}};
-  // Trainings of before there was such a thing can go on.
+  // Omitted when off, so that trainings begun before this option can resume.
   if (c.augmentation.strength_noise > 0) json["augmentation.strength_noise"] = c.augmentation.strength_noise;
   if (c.data.least_upscale > 0) {
     json["data.least_upscale"] = c.data.least_upscale;

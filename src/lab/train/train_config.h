@@ -14,8 +14,7 @@
 
 namespace anchorsplat {
 
-// Weights of the loss's terms, each a mean over the pictures of a step (photometric_objective.h, perceptual_objective.h
-// say what they are).
+// Weights of the loss terms, each a mean over a step's pictures (photometric_objective.h, perceptual_objective.h).
 struct LossConfig {
   double l1 = 1;
   double ssim = 0;
@@ -23,38 +22,38 @@ struct LossConfig {
   double log_mse = 0;
   double lpips = 0;
   LpipsNet lpips_net = LpipsNet::kVgg;
-  int lpips_crop = 192;  // pixels a side of the random part that LPIPS sees; 0: the whole picture
+  int lpips_crop = 192;  // side of the random crop for LPIPS, pixels; 0: the whole picture
 };
 
 enum class Schedule { kConstant, kCosine };
 
 struct OptimizerConfig {
-  double learning_rate = 1e-3;           // of groups that are not named
+  double learning_rate = 1e-3;           // for groups not named below
   std::map<std::string, double> groups;  // by the network's group names
   double beta1 = 0.9, beta2 = 0.999, epsilon = 1e-8;
   double weight_decay = 0;  // decoupled (AdamW)
-  double clip = 0;          // largest norm of the whole gradient, 0: any
+  double clip = 0;          // maximum gradient norm, 0: none
   Schedule schedule = Schedule::kCosine;
-  int64_t warm_up = 0;  // steps of linear rise
-  double final = 0.01;  // what is left of the rate at the end of a cosine
-  double ema = 0.999;   // of the weights that are validated and saved; 0: the last ones
+  int64_t warm_up = 0;  // steps of linear increase
+  double final = 0.01;  // final rate of a cosine schedule, relative
+  double ema = 0.999;   // decay of the averaged weights that are validated and saved; 0: no averaging
 };
 
 struct DataConfig {
-  int views_per_object = 24;  // fixed random choice among those that no validation may see; 0: all of them
+  int views_per_object = 24;  // fixed random choice among non-validation views; 0: all
   int scenes_per_step = 1;    // per process
   int views_per_step = 2;     // of each scene
-  int crop = 0;               // pixels a side of a random part of each view; 0: whole views
-  // Most Gaussians of which a step makes copies; 0: all. Crops then show one spot from several sides, the network
-  // works on the Gaussians seen there and the rest is drawn filtered.
+  int crop = 0;               // side of a random crop of each view, pixels; 0: whole views
+  // Maximum Gaussians copied by the network per step; 0: all. Crops then show one spot from several sides, the network
+  // processes the Gaussians visible there, and the rest is drawn filtered.
   int64_t part = 0;
-  bool fixed_views = false;  // always the first of an object's views instead of random ones
+  bool fixed_views = false;  // uses an object's first views instead of random ones
   int objects_in_memory = 64;
-  // What merges of copies may cost before a step shows them, drawn for every step, evenly in the logarithm; 0: all
-  // copies are shown. See merged_copies.h.
+  // Range of the maximum cost of merging copies before rendering, drawn log-uniformly per step; 0: no merging. See
+  // merged_copies.h.
   double least_merge_cost = 0, greatest_merge_cost = 0;
-  // How many times closer an object's views are, drawn by its name, evenly in the logarithm; 0: as the data set has
-  // them. Others than that are made on demand.
+  // Range of the upscale of an object's views, drawn log-uniformly by its name; 0: as in the data set. Other sizes are
+  // rendered on demand.
   double least_upscale = 0, greatest_upscale = 0;
 };
 
@@ -69,13 +68,13 @@ struct CapturesConfig {
 
 // What is drawn anew each time a splat is used. Standard deviations and largest values; 0: not at all.
 struct AugmentationConfig {
-  bool rotate = false;          // the world, SH and cameras with it
+  bool rotate = false;          // the world, with SH and cameras
   bool mirror = false;          // every second splat
-  double scale = 0;             // σ of ln(factor) of the world, at most two σ are drawn
-  bool permute_colors = false;  // red, green and blue change places
-  double gain = 0;              // colours times 1 − gain to 1, each channel for itself
-  double drop = 0;              // largest share of Gaussians left out
-  double opacity_noise = 0;     // σ of what is added to opacity logits
+  double scale = 0;             // σ of ln(factor) of the world, clamped to two σ
+  bool permute_colors = false;  // permutes red, green and blue
+  double gain = 0;              // multiplies colours by 1 − gain to 1, per channel
+  double drop = 0;              // maximum share of Gaussians left out
+  double opacity_noise = 0;     // σ added to opacity logits
   double pixel_size_noise = 0;  // σ of ln(factor) of p_LR, one factor per splat
   double strength_noise = 0;    // σ of ln(factor) of the filter's strength
 
@@ -86,17 +85,17 @@ struct ValidationConfig {
   int64_t every = 500;  // steps; 0: only at the end
   int views = 4;        // held-out views per object, evenly spread; 0: all
   int objects = 0;      // evenly spread; 0: all
-  bool lpips = false;   // LPIPS (AlexNet) too, where its weights are
+  bool lpips = false;   // also LPIPS (AlexNet), if its weights are installed
 };
 
 enum class Precision { kFp32, kBf16, kFp16 };
 
-// A training as its TOML file describes it (docs/training.md).
+// A training as described by its TOML file (docs/training.md).
 struct TrainConfig {
   uint64_t seed = 0;
   int64_t steps = 10000;
-  Precision precision = Precision::kFp32;  // autocast around the network alone
-  std::string device = "cpu";              // of the network: "cpu", "cuda" or "auto"; rendering stays on the CPU
+  Precision precision = Precision::kFp32;  // autocast for the network only
+  std::string device = "cpu";              // of the network: "cpu", "cuda" or "auto"; rendering is on the CPU
   int64_t checkpoint_every = 500;
   int64_t log_every = 10;
   std::string kind = "compact";
@@ -109,18 +108,18 @@ struct TrainConfig {
   ValidationConfig validation;
 
   std::string file;                          // for messages
-  std::map<std::string, int> network_lines;  // of the options in `network`
+  std::map<std::string, int> network_lines;  // line of each option in `network`
 };
 
-// Errors: those of ReadFileBytes; kBadFile "FILE: line 12: optimizer.clip: expected …": not TOML, an unknown table or
-// key, a value of a wrong type or out of its range.
+// Errors: those of ReadFileBytes; kBadFile "FILE: line 12: optimizer.clip: expected …": no TOML, an unknown table or
+// key, a value of the wrong type or range.
 Result<TrainConfig> ReadTrainConfig(const std::filesystem::path& path);
 Result<TrainConfig> ParseTrainConfig(const std::string& text, const std::string& name);
 
-// What must not change between the parts of one training, as a flat object. Steps, logging and validation may.
+// Settings that must not change when a training resumes, as a flat object. Steps, logging and validation may.
 nlohmann::json Settings(const TrainConfig& config);
 
-// A kBadFile error with the file and the line of the network option that its message begins with.
+// Prepends file and line of the network option with which the error's message begins (kBadFile).
 Error InNetworkTable(const TrainConfig& config, const Error& error);
 
 }  // namespace anchorsplat

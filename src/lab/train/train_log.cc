@@ -18,7 +18,7 @@ using Curve = std::vector<std::pair<double, double>>;
 
 constexpr double kWidth = 860, kHeight = 260, kLeft = 60, kBottom = 30;
 
-// The range of values that a chart shows, a little wider than they are.
+// Value range of a chart, slightly enlarged.
 std::pair<double, double> RangeOf(const Curve& curve, std::vector<double> levels) {
   for (const auto& [x, y] : curve) levels.push_back(y);
   std::erase_if(levels, [](double v) { return !std::isfinite(v); });
@@ -34,7 +34,7 @@ struct Level {
   double value;
 };
 
-// A line chart as SVG; `levels` are horizontal lines.
+// A line chart as SVG; `levels`: horizontal lines.
 std::string Chart(const std::string& title, const Curve& curve, const std::vector<Level>& levels, int digits) {
   std::vector<double> values;
   for (const Level& level : levels) values.push_back(level.value);
@@ -67,7 +67,7 @@ std::string Chart(const std::string& title, const Curve& curve, const std::vecto
   return std::move(out).str();
 }
 
-// Means of neighbours, so that a page of a long training stays small and its curve readable.
+// Averages neighbours, so that pages of long trainings stay small and curves readable.
 Curve Smoothed(const Curve& curve, size_t most) {
   const size_t part = (curve.size() + most - 1) / most;
   if (part <= 1) return curve;
@@ -92,7 +92,7 @@ Result<TrainLog> TrainLog::Open(const fs::path& folder, int64_t resume_at) {
   if (resume_at > 0) {
     std::ifstream file(folder / "log.jsonl");
     for (std::string line; std::getline(file, line);) {
-      const auto json = nlohmann::json::parse(line, nullptr, false);  // the last line may be cut off
+      const auto json = nlohmann::json::parse(line, nullptr, false);  // the last line may be truncated
       if (!json.is_object() || !json.contains("step") || !json["step"].is_number()) continue;
       if (json["step"].get<double>() > static_cast<double>(resume_at)) continue;
       kept += line + "\n";

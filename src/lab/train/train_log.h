@@ -10,14 +10,14 @@
 
 namespace anchorsplat {
 
-// log.jsonl of a training, one JSON object per line, and the page curve.html that is drawn of it. A training that goes
-// on from a checkpoint goes on with the log as it was at that step.
+// The log of a training, log.jsonl (one JSON object per line), and its plot, curve.html. A resumed training continues
+// the log from its checkpoint's step.
 class TrainLog {
  public:
-  // `resume_at`: keep the lines up to that step; 0: begin a new file. Errors: kIo.
+  // `resume_at`: keeps lines up to that step; 0: new file. Errors: kIo.
   static Result<TrainLog> Open(const std::filesystem::path& folder, int64_t resume_at);
 
-  // Appends a line at once, so that whoever watches sees it. It must have "step".
+  // Appends a line and flushes it. It must have "step".
   Status Add(const nlohmann::json& line);
   Status WriteCurve() const;
 

@@ -36,9 +36,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMostBadSteps = 50;  // on end
+constexpr int kMostBadSteps = 50;  // in succession
 constexpr double kFirstLossScale = 65536;
-constexpr int64_t kLossScaleGrowth = 2000;  // good steps before it doubles
+constexpr int64_t kLossScaleGrowth = 2000;  // good steps before the loss scale doubles
 
 GaussianTensors InFloat(const GaussianTensors& g) {
   const auto host = [](const torch::Tensor& t) { return t.to(torch::kCPU, torch::kFloat32); };
@@ -52,7 +52,7 @@ GaussianTensors Together(const GaussianTensors& a, const GaussianTensors& b) {
           both(a.opacity_logits, b.opacity_logits), both(a.sh, b.sh)};
 }
 
-// Seconds by part of a step, and the loss's terms, added up between two lines of the log.
+// Seconds per part of a step and loss terms, summed between two log lines.
 struct Sums {
   int64_t steps = 0, views = 0;
   double data = 0, network = 0, render = 0, loss_time = 0, backward = 0, optimizer = 0;
@@ -82,7 +82,7 @@ class Trainer {
   double PartDone() const;
   bool Leads() const { return !group_ || group_->rank() == 0; }
   bool Asked() const { return StopRequested(); }
-  // With others, only what all of them know of counts: else one would wait for another that has gone.
+  // With several processes only what all agreed on counts; else one would wait for another that has ended.
   bool Stopping() const { return group_ ? agreed_stop_ : Asked(); }
   void Agree();
 
@@ -90,7 +90,7 @@ class Trainer {
   TrainConfig config_;
   std::string config_text_;
   torch::Device device_ = torch::kCPU;
-  std::unique_ptr<ProcessGroup> group_;  // null: this process is alone
+  std::unique_ptr<ProcessGroup> group_;  // null: single process
   TrainingData data_;
   std::unique_ptr<ObjectStore> objects_;
   std::shared_ptr<TrainableNetwork> network_;
@@ -105,7 +105,7 @@ class Trainer {
   double clock_seconds_ = 0;  // of this run
   Sums sums_;
   int bad_steps_ = 0;
-  // What all processes go by: a clock that all of them read alike, and whether one of them was asked to stop.
+  // Agreed by all processes: elapsed time, and whether one was asked to stop.
   double agreed_elapsed_ = 0;
   bool agreed_stop_ = false;
   double last_norm_ = 0, last_factor_ = 0, last_loss_ = 0, last_psnr_ = 0;
@@ -132,7 +132,7 @@ Status Trainer::Begin() {
   if (config_.device == "cuda" || (config_.device == "auto" && torch::cuda::is_available())) device_ = torch::kCUDA;
   ANCHORSPLAT_ASSIGN_OR_RETURN(group_, ProcessGroup::FromEnvironment());
   at::set_num_threads(ThreadCount());
-  // Sums over gathered rows in one order; without filling fresh memory, which deterministic mode does besides.
+  // Deterministic gather sums, but without deterministic mode's filling of fresh memory.
   at::globalContext().setDeterministicAlgorithms(true, /*warn_only=*/true);
   at::globalContext().setDeterministicFillUninitializedMemory(false);
 
@@ -181,7 +181,7 @@ Status Trainer::Begin() {
     ANCHORSPLAT_ASSIGN_OR_RETURN(progress_, ReadTrainCheckpoint(checkpoint, progress_, *optimizer_));
   } else if (!request_.start.empty()) {
     ANCHORSPLAT_RETURN_IF_ERROR(StartFromCheckpoint(request_.start, *optimizer_));
-    ANCHORSPLAT_RETURN_IF_ERROR(CheckNotInput(checkpoint));  // not the one that is to be replaced
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckNotInput(checkpoint));  // must not be the start checkpoint
   }
   if (Leads()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(log_, TrainLog::Open(request_.out, progress_.step));
@@ -209,7 +209,7 @@ double Trainer::PartDone() const {
   return request_.minutes ? std::max(steps, agreed_elapsed_ / (60 * *request_.minutes)) : steps;
 }
 
-// Copies as `enhance` leaves them, at a cost that the step draws.
+// Merges copies as `enhance` does, at a cost drawn for the step.
 GaussianTensors Trainer::Merged(const GaussianTensors& all, const NetworkInput& input) const {
   const double least = std::log(config_.data.least_merge_cost), most = std::log(config_.data.greatest_merge_cost);
   const double drawn = torch::rand({1}, torch::kFloat64).item<double>();
@@ -220,7 +220,7 @@ GaussianTensors Trainer::Merged(const GaussianTensors& all, const NetworkInput& 
                             .cost = std::exp(least + drawn * (most - least))});
 }
 
-// One sample's share of the gradient.
+// Computes one sample's gradient.
 Status Trainer::Look(SampleLoader& loader) {
   Stopwatch watch;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingSample sample, loader.Next());
@@ -262,7 +262,7 @@ Status Trainer::Look(SampleLoader& loader) {
   return {};
 }
 
-// Gradients, losses, clocks and wishes of all processes, in one sum.
+// Sums gradients, losses, clocks and stop requests over all processes at once.
 void Trainer::Agree() {
   if (!group_) {
     agreed_elapsed_ = Elapsed();
@@ -287,7 +287,7 @@ void Trainer::Agree() {
   network_->ShareMemory([this](torch::Tensor& tensor) { group_->Max(tensor); });
 }
 
-// Applies the gradient, if it is one.
+// Applies the gradient if it is finite.
 Status Trainer::Update() {
   Agree();
   last_norm_ = optimizer_->GradientNorm() / progress_.loss_scale;
@@ -317,7 +317,7 @@ Status Trainer::Update() {
 }
 
 Status Trainer::Step(SampleLoader& loader) {
-  // DropPath and its like: a stream of its own for every step.
+  // For DropPath and the like: a separate random stream per step.
   torch::manual_seed(StableHash(Cat("step ", progress_.step), config_.seed));
   network_->train();
   optimizer_->ZeroGradients();
@@ -379,7 +379,7 @@ Status Trainer::SaveNetwork(const char* name) {
                                                  {"steps", Cat(progress_.step)},
                                                  {"objects", Cat(report_.objects)},
                                                  {"object_names", data_.names}};
-  if (request_.minutes) metadata["minutes"] = Cat(*request_.minutes);  // which end a training before the recipe's steps
+  if (request_.minutes) metadata["minutes"] = Cat(*request_.minutes);  // may end training before the recipe's steps
   if (report_.model) {
     const nlohmann::json quality = {
         {"model", ToJson(*report_.model)}, {"raw", ToJson(*report_.raw)}, {"filter", ToJson(*report_.filter)}};
@@ -392,7 +392,7 @@ Status Trainer::SaveNetwork(const char* name) {
 }
 
 Status Trainer::Validate() {
-  if (!validation_) return {};  // nothing to measure with, or not the leading process
+  if (!validation_) return {};  // no validation data, or not the leading process
   Stopwatch watch;
   ANCHORSPLAT_ASSIGN_OR_RETURN(report_.raw, validation_->Raw());
   ANCHORSPLAT_ASSIGN_OR_RETURN(report_.filter, validation_->Filter());
@@ -450,7 +450,7 @@ Status Trainer::Run() {
       if (Due(config_.log_every)) ANCHORSPLAT_RETURN_IF_ERROR(WriteLogLine());
       if (Due(config_.validation.every) && !Over()) ANCHORSPLAT_RETURN_IF_ERROR(Validate());
       if (Due(config_.checkpoint_every) && !Over()) ANCHORSPLAT_RETURN_IF_ERROR(WriteAll());
-      clock_.Lap();  // minutes are of training alone
+      clock_.Lap();  // excludes validation from the minutes
     }
   }
   if (sums_.steps > 0) report_.loss = sums_.loss / static_cast<double>(sums_.steps);

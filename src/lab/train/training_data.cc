@@ -57,11 +57,11 @@ Result<TrainingData> FindTrainingData(const TrainRequest& request, const Capture
                                       const fs::path& cache) {
   TrainingData data;
   for (const fs::path& dataset : request.validation) {
-    // A whole data set is meant when it has no splits.
+    // A data set without splits is used whole.
     ANCHORSPLAT_RETURN_IF_ERROR(AppendScenes(dataset, HasSplits(dataset) ? "validation" : "", data.validation));
   }
   for (const fs::path& dataset : request.datasets) {
-    // Splits are there to be kept: without a word about it, only the objects for training are taken.
+    // Splits are respected: by default only the training objects are used.
     const std::string split = request.split.empty() && HasSplits(dataset) ? "train" : request.split;
     ANCHORSPLAT_RETURN_IF_ERROR(AppendScenes(dataset, split, data.training));
     if (request.validation.empty() && HasSplits(dataset)) {

@@ -12,7 +12,7 @@
 
 namespace anchorsplat {
 
-// The objects of a training, found but not read.
+// Objects of a training, found but not read.
 struct TrainingData {
   std::vector<SceneEntry> training;    // in order of data sets and names
   std::vector<SceneEntry> validation;  // none of them in `training`, by folder or by name
@@ -25,8 +25,8 @@ struct TrainingData {
 Result<TrainingData> FindTrainingData(const TrainRequest& request, const CapturesConfig& captures,
                                       const std::filesystem::path& cache);
 
-// Draws SceneEntry::high_size of every object, by its name alone: `least` to `greatest` times the low views' pixels,
-// evenly in the logarithm. Errors: those of Scene::Open, which has to be able to make such views.
+// Draws SceneEntry::high_size of every object from its name alone: `least` to `greatest` times the low views' size,
+// log-uniformly. Errors: those of Scene::Open, for views that cannot be rendered on demand.
 Status DrawUpscales(double least, double greatest, std::vector<SceneEntry>& scenes);
 
 }  // namespace anchorsplat

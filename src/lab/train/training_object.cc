@@ -14,7 +14,7 @@ namespace anchorsplat {
 
 namespace {
 
-// `count` of the values, drawn by the name alone; in ascending order.
+// `count` of the values, chosen by the name alone, ascending.
 std::vector<size_t> Drawn(std::vector<size_t> values, size_t count, const std::string& name) {
   if (count == 0 || count >= values.size()) return values;
   Random random(StableHash(name));

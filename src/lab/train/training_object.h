@@ -27,25 +27,25 @@ struct TrainingCapture {
 // An object of a data set, ready to be trained on or measured with.
 struct TrainingObject {
   std::string name;
-  GaussianCloud cloud;             // the low-quality splat, without rows that are not finite
-  Buffer<float> pixel_sizes;       // [N] p_LR: the median over the low cameras that see a Gaussian, as eval's filter
-  double upscale = 4;              // u: high pixels per low pixel
+  GaussianCloud cloud;             // the low-quality splat without non-finite rows
+  Buffer<float> pixel_sizes;       // [N] p_LR: median over the low cameras that see a Gaussian, as for eval's filter
+  double upscale = 4;              // u: high pixels per low pixel side
   double strength = 0;             // f of the filter
   std::vector<Camera> views;       // high resolution
-  std::vector<Camera> low_views;   // that the splat was fitted to, seen from the same places
-  std::vector<size_t> training;    // which of them training may see
-  std::vector<size_t> validation;  // and those that the splat was not fitted to
+  std::vector<Camera> low_views;   // that the splat was fitted to, same poses
+  std::vector<size_t> training;    // views that training may use
+  std::vector<size_t> validation;  // views that the splat was not fitted to
   std::shared_ptr<const TrueViews> truth;
   std::array<float, 3> background{};
-  std::shared_ptr<void> prepared;  // a network's tables for the cloud as it is; set by whoever makes them
-  // For parts of it: a network's survey, and what training views see; set by whoever makes them.
+  std::shared_ptr<void> prepared;  // a network's tables for the unaugmented cloud; set by whoever computes them
+  // For training on parts: a network's survey, and visibility in training views; set likewise.
   std::shared_ptr<const void> survey;
   std::shared_ptr<const SeenGaussians> seen;
 };
 
-// `views_per_object`: so many of the views that were fitted to are for training, chosen by the object's name alone (so
-// that trainings can share pictures); 0: all of them. Errors: those of Scene; kBadFile: a splat without finite
-// Gaussians, no views, high views smaller than the low ones.
+// Opens an object. `views_per_object`: number of fitted views to use for training, chosen by the object's name alone
+// (so that trainings can share pictures); 0: all. Errors: those of Scene; kBadFile: a splat without finite Gaussians,
+// no views, high views smaller than the low ones.
 Result<std::shared_ptr<TrainingObject>> OpenTrainingObject(const SceneEntry& entry, int views_per_object,
                                                            const std::filesystem::path& cache);
 
@@ -58,7 +58,7 @@ Result<std::shared_ptr<TrainingObject>> OpenTrainingCapture(const TrainingCaptur
 // `most` of `values`, evenly spread; all when there are not as many or `most` is 0.
 std::vector<size_t> EvenlySpread(const std::vector<size_t>& values, size_t most);
 
-// The objects used last, by number. May be used by several threads.
+// Cache of the objects used last, by index. Thread-safe.
 class ObjectStore {
  public:
   ObjectStore(std::vector<SceneEntry> entries, std::vector<TrainingCapture> captures, int views_per_object,
@@ -79,7 +79,7 @@ class ObjectStore {
   const std::filesystem::path cache_;
   const size_t capacity_;
   std::mutex mutex_;
-  std::list<std::pair<size_t, std::shared_ptr<TrainingObject>>> used_;  // latest first
+  std::list<std::pair<size_t, std::shared_ptr<TrainingObject>>> used_;  // most recent first
 };
 
 }  // namespace anchorsplat

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What tells two objects of one name apart: where they are and how their views are made.
+// Distinguishes objects of equal name: by location and by how their views are made.
 std::string FolderName(const SceneEntry& entry, const Scene& scene) {
   std::error_code ignored;
   const fs::path mesh = entry.folder / kMeshName;
@@ -40,7 +40,7 @@ Image CutOut(const Image& image, const PixelBox& box) {
   return part;
 }
 
-// "012_100_200.png" of view "012": where its left upper corner lies.
+// Parses "012_100_200.png" of view "012": position of its upper left corner.
 bool ParseCorner(std::string_view text, int& x, int& y) {
   const char* end = text.data() + text.size();
   const auto [middle, code] = std::from_chars(text.data(), end, x);
@@ -93,7 +93,7 @@ struct TrueViews::Kept {
 
 namespace {
 
-// Over the background; `window` and the part's box are pixels of the view. value(c, y, x) is of the part.
+// Composites a part over the background; `window` and the part's box are in view pixels, value(c, y, x) in the part's.
 template <typename Value>
 TrueView Compose(const PixelBox& window, const PixelBox& box, int channels, const Buffer<uint8_t>& ignored,
                  const std::array<float, 3>& background, Value&& value) {

@@ -19,13 +19,13 @@
 
 namespace anchorsplat {
 
-// The high-resolution pictures of one object as training wants them: quickly, again and again. Views that the data set
-// stores are read from there; those that it renders on demand, which takes a few tenths of a second each, are rendered
-// once and kept in a folder as PNG, cut to the pixels that show something. May be used by several threads and by
-// several programs at once.
+// Fast repeated access to an object's high-resolution pictures. Stored views are read from the data set. Views rendered
+// on demand, which takes tenths of a second each, are rendered once and cached in a folder as PNG, cropped to what they
+// show.
+// Safe for several threads and several programs at once.
 class TrueViews {
  public:
-  // `cache`: folder for all objects of all trainings. Nothing is made before the first view is asked for.
+  // `cache`: folder for all objects of all trainings. Created with the first view.
   TrueViews(SceneEntry entry, const Scene& scene, const std::filesystem::path& cache);
 
   // Photographs that `picture` opens, of the sizes of `views`, without an object on a background: all of them counts,
@@ -35,18 +35,17 @@ class TrueViews {
   // Pixels over the object's background. Errors: those of Scene::HighPicture, ReadImage and WritePng.
   Result<TrueView> Load(size_t view) const;
 
-  // Renders those of the views that are neither stored nor in the folder. Faster than one after the other as they are
-  // asked for: the mesh is opened once.
+  // Renders those of `views` that are neither stored nor cached. Faster than on demand, as the mesh is opened once.
   Status Make(std::span<const size_t> views) const;
 
-  // The pixels inside of a window of the view, which must not reach out of it. Views of which windows were asked for
-  // stay in memory, cut to the object, at 8 bits: opening a file takes longer than the window.
+  // Picture in a window, which must be inside the view. The view stays in memory, cropped to the object, at 8 bits:
+  // opening its file takes longer than the window.
   Result<TrueView> LoadWindow(size_t view, const PixelBox& window) const;
-  // What Load has as the view's `object`.
+  // The `object` box that Load returns.
   Result<PixelBox> Box(size_t view) const;
 
  private:
-  // The pixels that show something, 3 or 4 channels.
+  // A picture cropped to what it shows, 3 or 4 channels.
   struct Part {
     Image picture;
     PixelBox box;             // where in the view; as large as the picture
@@ -55,7 +54,7 @@ class TrueViews {
   struct Kept;
   struct File {
     std::filesystem::path path;
-    int x = 0, y = 0;  // of its left upper corner in the view
+    int x = 0, y = 0;  // position of its upper left corner in the view
   };
 
   std::optional<File> Find(size_t view) const;
@@ -64,7 +63,7 @@ class TrueViews {
 
   SceneEntry entry_;
   std::filesystem::path folder_;
-  std::vector<std::filesystem::path> stored_;  // pictures of the data set by view; empty where it has none
+  std::vector<std::filesystem::path> stored_;  // pictures in the data set by view; empty paths for the others
   std::vector<std::string> names_;
   std::vector<std::array<int, 2>> sizes_;                       // width and height
   std::function<Result<ViewPicture>(size_t view)> photograph_;  // of a capture; else empty
@@ -73,8 +72,8 @@ class TrueViews {
   mutable std::vector<std::shared_ptr<const Kept>> kept_;  // by view
 };
 
-// The smallest box of the pixels of a picture with 3 or 4 channels that are not the background: alpha above 0, or for
-// pictures without alpha a colour that differs.
+// Bounding box of non-background pixels of a picture with 3 or 4 channels: alpha above 0 or, without alpha, another
+// colour than the background.
 PixelBox ObjectBox(const Image& picture, const std::array<float, 3>& background);
 
 }  // namespace anchorsplat

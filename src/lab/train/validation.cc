@@ -10,7 +10,7 @@
 
 namespace anchorsplat {
 
-// The tables of a splat stay in memory between validations; true pictures are read again.
+// An object with its tables, kept between validations; true pictures are read again.
 struct Validation::Object {
   std::shared_ptr<TrainingObject> data;
   std::vector<size_t> views;

@@ -16,9 +16,9 @@
 
 namespace anchorsplat {
 
-// How well a network does on objects it is not trained on: held-out views at full size, renders clamped to 0–1, means
-// over the views of an object and then over objects, as the evaluation's protocol "heldout". Beside it the raw splat
-// and the filter with its default strength and the true pixel sizes.
+// Measures a network on objects it is not trained on: held-out views at full size, renders clamped to 0–1, means over
+// an object's views and then over objects, as protocol "heldout". Also measures the raw splat and the filter with
+// default strength and true pixel sizes.
 class Validation {
  public:
   // `perceptual` may be null.
@@ -27,10 +27,10 @@ class Validation {
 
   size_t objects() const { return entries_.size(); }
 
-  // Of the network as it is, which is put into evaluation mode and back. Errors: those of OpenTrainingObject, Prepare
-  // and the rasterizer.
+  // Measures the network in evaluation mode, then restores its mode. Errors: those of OpenTrainingObject, Prepare and
+  // the rasterizer.
   Result<TrainQuality> Measure(TrainableNetwork& network);
-  // Measured once.
+  // Computed once.
   Result<TrainQuality> Raw();
   Result<TrainQuality> Filter();
 

@@ -42,7 +42,7 @@ struct ReadingFlags {
   std::string tasks, output;
   int views = 4;
   std::string table, decisions, folds;
-  double losses_count = kLossesCount;
+  double loss_weight = kLossWeight;
 };
 
 Status PrintFeatures(const ReadingFlags& flags, Program& program) {
@@ -219,7 +219,7 @@ Status Score(const ReadingFlags& flags, const SharedFlags& shared) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(ReadingModel model, ReadingModel::Load(file));
       models.push_back(std::move(model));
     }
-    deciders.emplace_back("model", ReadDecisions(rows, models, flags.losses_count));
+    deciders.emplace_back("model", ReadDecisions(rows, models, flags.loss_weight));
   }
   deciders.emplace_back("the list", TodaysDecisions(rows));
   for (const char* method : {"filter", "network"}) {
@@ -312,7 +312,7 @@ void AddReadingBench(CLI::App& bench, Program& program) {
       verb.add_option("--folds", flags->folds,
                       "Folder of models that have not seen a fold each (scripts/train-reading.py): how they decide it")
           ->needs(table);
-  verb.add_option("--losses-count", flags->losses_count,
+  verb.add_option("--losses-count", flags->loss_weight,
                   "With --folds: how much more a decibel that is lost counts than one that is gained")
       ->needs(folds)
       ->check(NotNegative())

@@ -9,7 +9,7 @@
 
 namespace anchorsplat {
 
-// The choice among copies of a cloud that is there as a whole: what blocks must come to as well.
+// Chooses among the copies of a whole cloud at once. Choosing block by block must give the same.
 inline Result<ChosenCopies> ChooseCopies(CopyGroups groups, const CopyChoice& choice, GaussianCloud& cloud) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(choice, groups.copies));
   const int64_t made = cloud.size() - (groups.stand_ins ? groups.count : 0);
@@ -19,10 +19,10 @@ inline Result<ChosenCopies> ChooseCopies(CopyGroups groups, const CopyChoice& ch
   const int64_t over = made - plans.front().merged() - choice.max_gaussians;
   if (choice.max_gaussians > 0) MergeMore(plans, over, [](size_t, int64_t group) { return group; });
   std::vector<char> keep(static_cast<size_t>(cloud.size()), 1);
-  plans.front().Carry(cloud, keep);
+  plans.front().ApplyTo(cloud, keep);
   KeepMarked(keep, cloud);
   done.merged = made - cloud.size();
-  done.left_out = LeaveOutLeastVisible(choice.max_gaussians, cloud);
+  done.left_out = DropLeastVisible(choice.max_gaussians, cloud);
   return done;
 }
 

@@ -31,23 +31,23 @@ namespace {
 constexpr std::string_view kMagic = "anchorsplat network 1\n";
 constexpr uint64_t kMostSettings = 1 << 16;
 
-// Before the arrays of a block, in the machine's byte order: a checkpoint goes on where it was made.
+// Precedes a block's arrays, in the machine's byte order: a run resumes on the machine that began it.
 struct BlockHeader {
-  int64_t block, outside, partly, not_finite, inside, made, rows;
-  uint64_t checksum;  // of the fields before it, and of the arrays
+  int64_t block, unlike_training, partly_unlike_training, not_finite, copied, made, rows;
+  uint64_t checksum;  // of the fields above and the arrays
 };
 static_assert(sizeof(BlockHeader) == 64);
 
 uint64_t ChecksumOf(const BlockHeader& header, const CompactPart& part) {
   Fingerprint print;
-  print.Add(std::array{header.block, header.outside, header.partly, header.not_finite, header.inside, header.made,
-                       header.rows});
+  print.Add(std::array{header.block, header.unlike_training, header.partly_unlike_training, header.not_finite,
+                       header.copied, header.made, header.rows});
   print.Add(part.keys);
   for (const auto array : kCloudArrays) print.AddWords(part.cloud.*array);
   return print.value();
 }
 
-// All of it; false with errno otherwise. At the end of the file: EIO.
+// Reads exactly `bytes`; false with errno otherwise, EIO at the end of the file.
 bool ReadAll(int descriptor, void* to, size_t bytes, uint64_t at) {
   for (auto* next = static_cast<char*>(to); bytes > 0;) {
     const ssize_t read = ::pread(descriptor, next, bytes, static_cast<off_t>(at));
@@ -85,7 +85,7 @@ Error CannotOpen(const fs::path& path) {
           Cat(path.string(), ": cannot be opened: ", std::generic_category().message(errno))};
 }
 
-// The settings, up to the end of their line.
+// Reads the settings, the first line.
 Result<std::string> ReadSettings(const fs::path& path, int descriptor, uint64_t size) {
   std::string text(std::min<uint64_t>(size, kMagic.size() + kMostSettings), '\0');
   if (!ReadAll(descriptor, text.data(), text.size(), 0)) return CannotOpen(path);
@@ -125,19 +125,19 @@ std::string CheckpointSettings(const std::string& network, const GaussianCloud& 
                         {"bound of Gaussians", choice.max_gaussians},
                         {"least opacity", choice.invisible},
                         {"choice of dust", print_of(task.single)},
-                        {"region", print_of(task.inside)},
+                        {"region", print_of(task.in_region)},
                         {"size of blocks", task.block_gaussians}}
       .dump();
 }
 
-bool IsOfBlock(const CompactBlockResult& result, const Buffer<int32_t>& places, int64_t block_gaussians, int64_t copies,
-               bool waits, bool stand_ins) {
+bool FitsBlock(const CompactBlockResult& result, const Buffer<int32_t>& places, int64_t block_gaussians, int64_t copies,
+               bool merging_deferred, bool stand_ins) {
   const auto n = static_cast<int64_t>(places.size());
   const CompactPart& part = result.part;
   const auto rows = static_cast<int64_t>(part.keys.size());
   const int64_t first = result.block * block_gaussians, own = std::min(block_gaussians, n - first);
-  if (part.inside < 0 || part.inside > own) return false;
-  const int64_t standing = waits && stand_ins ? part.inside : 0;  // rows of stand-ins that wait as well
+  if (part.copied < 0 || part.copied > own) return false;
+  const int64_t standing = merging_deferred && stand_ins ? part.copied : 0;  // deferred stand-in rows
   if (part.made < rows - standing || part.made > copies * own) return false;
   std::vector<char> seen(static_cast<size_t>((copies + 1) * own), 0);
   for (const int64_t key : part.keys) {
@@ -148,12 +148,12 @@ bool IsOfBlock(const CompactBlockResult& result, const Buffer<int32_t>& places, 
     if (before != 0) return false;
     before = 1;
   }
-  if (!waits) return true;
+  if (!merging_deferred) return true;
   const int64_t each = copies + (stand_ins ? 1 : 0);
-  if (part.made != rows - standing || each * part.inside > rows) return false;
+  if (part.made != rows - standing || each * part.copied > rows) return false;
   for (int64_t k = 0; k < each; ++k) {
-    for (int64_t g = 0; g < part.inside; ++g) {
-      if (part.keys[static_cast<size_t>(k * part.inside + g)] != k * n + part.keys[static_cast<size_t>(g)])
+    for (int64_t g = 0; g < part.copied; ++g) {
+      if (part.keys[static_cast<size_t>(k * part.copied + g)] != k * n + part.keys[static_cast<size_t>(g)])
         return false;
     }
   }
@@ -195,9 +195,10 @@ Result<bool> CompactCheckpoint::Next(const GaussianCloud& of, CompactBlockResult
   const auto per_row = static_cast<uint64_t>(11 + of.sh_stride()) * sizeof(float) + sizeof(int64_t);
   const uint64_t left = size_ - at_ - sizeof header;
   if (header.rows < 0 || static_cast<uint64_t>(header.rows) > left / per_row) return false;
-  result = {header.block, header.outside, header.partly, header.not_finite, std::move(result.part)};
+  result = {header.block, header.unlike_training, header.partly_unlike_training, header.not_finite,
+            std::move(result.part)};
   CompactPart& part = result.part;
-  part.inside = header.inside;
+  part.copied = header.copied;
   part.made = header.made;
   part.cloud.render_mode = of.render_mode;
   part.cloud.Resize(header.rows, of.sh_degree);
@@ -220,8 +221,14 @@ Result<bool> CompactCheckpoint::Next(const GaussianCloud& of, CompactBlockResult
 void CompactCheckpoint::Append(const CompactBlockResult& result) {
   if (full_) return;
   const CompactPart& part = result.part;
-  BlockHeader header{result.block, result.outside, result.partly,     result.not_finite,
-                     part.inside,  part.made,      part.cloud.size(), 0};
+  BlockHeader header{result.block,
+                     result.unlike_training,
+                     result.partly_unlike_training,
+                     result.not_finite,
+                     part.copied,
+                     part.made,
+                     part.cloud.size(),
+                     0};
   header.checksum = ChecksumOf(header, part);
   uint64_t at = at_ + sizeof header;
   const auto write = [&](const auto& array) {
@@ -230,7 +237,7 @@ void CompactCheckpoint::Append(const CompactBlockResult& result) {
     at += bytes;
     return all;
   };
-  // What a kill tore apart goes first, and a block's header comes last: without it there is none.
+  // Cuts off a torn block, and writes the header last: a block without header does not exist.
   bool all = ::ftruncate(descriptor_, static_cast<off_t>(at_)) == 0 && write(part.keys);
   for (const auto array : kCloudArrays) all = all && write(part.cloud.*array);
   all = all && WriteAll(descriptor_, &header, sizeof header, at_);

@@ -15,45 +15,45 @@ namespace anchorsplat {
 
 struct CompactTask;
 
-// What one block of a network's run came to.
+// The output of one block.
 struct CompactBlockResult {
   int64_t block = 0;
-  int64_t outside = 0, partly = 0, not_finite = 0;  // as of CompactResult
+  int64_t unlike_training = 0, partly_unlike_training = 0, not_finite = 0;  // as in CompactResult
   CompactPart part;
 };
 
-// All by which a run differs from another, as one JSON object of one level. `network`: fingerprint of its weights, and
-// of those of the stand-ins.
+// Everything that distinguishes this run from others, as a flat JSON object. `network`: fingerprint of the weights of
+// the network and, if used, of the stand-in network.
 std::string CheckpointSettings(const std::string& network, const GaussianCloud& cloud, const CompactTask& task);
 
-// Whether what a file says is of a block of this run: rows of the block's own Gaussians, none twice, and all copies
-// where they wait for the last block, with `stand_ins` those, too. `places`: of the input's Gaussians in the order of
-// the blocks, of `block_gaussians` each.
-bool IsOfBlock(const CompactBlockResult& result, const Buffer<int32_t>& places, int64_t block_gaussians, int64_t copies,
-               bool waits, bool stand_ins);
+// Whether a result read from a file can be block `result.block` of this run: its rows are that block's Gaussians, none
+// twice, with all copies if `merging_deferred` and all stand-ins if `stand_ins`. `places`: rows of the input in block
+// order, `block_gaussians` per block.
+bool FitsBlock(const CompactBlockResult& result, const Buffer<int32_t>& places, int64_t block_gaussians, int64_t copies,
+               bool merging_deferred, bool stand_ins);
 
-// What the blocks of a network's run have made, one behind the other in a file, so that a run that ends before its end,
-// in whatever way, is not lost: another one with the same settings reads them and makes the rest. Every block has a
-// checksum. What a kill tore apart at the end, or what was damaged, is as if it had not been made, and what is behind
-// it as well.
+// Saves finished blocks to a file, one after another, so that an interrupted run can resume with the same settings.
+// Every block has a checksum. Reading stops at the first torn or damaged block; that one and all later ones are
+// computed again.
 //
-// The file belongs to one run at a time (fit/checkpoint_guard.h), and whoever wrote the result removes it.
+// One run uses the file at a time (fit/checkpoint_guard.h). Whoever writes the final result deletes it.
 class CompactCheckpoint {
  public:
-  // Without `resume`, or where there is no file, an empty one takes the place of what is there. `settings`: all by
-  // which a run differs from another, as one JSON object of one level. Errors: kBadArgument: it is of another run, with
-  // the name of what differs; kBadFile: it is no checkpoint of a network, or a damaged one; kIo; those of OutputFile.
+  // Opens the file to resume from it. Replaces it with an empty one if `resume` is false or the file is missing.
+  // `settings`: from CheckpointSettings.
+  // Errors: kBadArgument if it belongs to another run (names the setting that differs); kBadFile if it is no checkpoint
+  // of a network, or damaged; kIo; those of OutputFile.
   static Result<CompactCheckpoint> Open(const std::filesystem::path& path, const std::string& settings, bool resume);
 
   CompactCheckpoint(CompactCheckpoint&& other) noexcept;
   CompactCheckpoint& operator=(CompactCheckpoint&&) = delete;
   ~CompactCheckpoint();
 
-  // The next block; false: there is none that is whole. `of`: what it belongs to, for its degree and mode.
+  // Reads the next block; false if no intact one is left. `of`: the input cloud, for SH degree and render mode.
   Result<bool> Next(const GaussianCloud& of, CompactBlockResult& result);
 
-  // Writes behind the last block that Next found. What cannot be written, as the disk is full, is a warning: then the
-  // file stays as it is, and nothing more is written.
+  // Writes after the last block that Next read. If writing fails (disk full), warns once, keeps what is there and
+  // ignores later calls.
   void Append(const CompactBlockResult& result);
 
  private:
@@ -62,12 +62,12 @@ class CompactCheckpoint {
 
   std::filesystem::path path_;
   int descriptor_ = -1;
-  uint64_t at_ = 0;    // end of the last block that is whole
+  uint64_t at_ = 0;    // end of the last intact block
   uint64_t size_ = 0;  // of the file
   bool full_ = false;
 };
 
-// Whether the file is one, by its beginning; then it counts as the command's own (io/input_record.h).
+// Whether the file starts like a checkpoint. If so, registers it as the command's own (io/input_record.h).
 bool IsCompactCheckpoint(const std::filesystem::path& path);
 
 }  // namespace anchorsplat

@@ -96,8 +96,8 @@ class CompactCheckpointTest : public testing::Test {
 
 void ExpectSameBits(const CompactResult& a, const CompactResult& b) {
   EXPECT_EQ(a.made, b.made);
-  EXPECT_EQ(a.outside, b.outside);
-  EXPECT_EQ(a.partly, b.partly);
+  EXPECT_EQ(a.unlike_training, b.unlike_training);
+  EXPECT_EQ(a.partly_unlike_training, b.partly_unlike_training);
   EXPECT_EQ(a.not_finite, b.not_finite);
   EXPECT_EQ(a.chosen.merged, b.chosen.merged);
   EXPECT_EQ(a.chosen.left_out, b.chosen.left_out);
@@ -116,7 +116,7 @@ TEST_F(CompactCheckpointTest, AnInterruptedRunGoesOnToTheSameBits) {
   within.single = dust;
   std::vector<char> inside(kGaussians, 1);
   for (size_t i = 0; i < inside.size(); i += 3) inside[i] = 0;
-  within.inside = inside;
+  within.in_region = inside;
   const auto one = CompactNetwork::Load({.copies = 1}, OpenDomain());
   ASSERT_TRUE(one.ok());
   CompactTask with_stand_ins = Task(), bounded_with = bounded;
@@ -227,17 +227,17 @@ TEST_F(CompactCheckpointTest, BeginsAnew) {
 TEST_F(CompactCheckpointTest, BlocksOfAnotherRunAreNone) {
   Buffer<int32_t> places;
   for (int32_t i = 0; i < 10; ++i) places.push_back(i);
-  CompactBlockResult result{.block = 1, .part = {.keys = {4, 5, 14, 15, 26}, .cloud = {}, .inside = 2, .made = 5}};
+  CompactBlockResult result{.block = 1, .part = {.keys = {4, 5, 14, 15, 26}, .cloud = {}, .copied = 2, .made = 5}};
   bool stand_ins = false;
-  const auto is = [&](bool waits) {
-    return IsOfBlock(result, places, /*block_gaussians=*/4, /*copies=*/2, waits, stand_ins);
+  const auto is = [&](bool merging_deferred) {
+    return FitsBlock(result, places, /*block_gaussians=*/4, /*copies=*/2, merging_deferred, stand_ins);
   };
   EXPECT_TRUE(is(false));
   EXPECT_TRUE(is(true));
-  const auto with = [&](const std::function<void(CompactPart&)>& change, bool waits) {
+  const auto with = [&](const std::function<void(CompactPart&)>& change, bool merging_deferred) {
     const CompactPart before = result.part;
     change(result.part);
-    const bool fits = is(waits);
+    const bool fits = is(merging_deferred);
     result.part = before;
     return fits;
   };
@@ -248,10 +248,10 @@ TEST_F(CompactCheckpointTest, BlocksOfAnotherRunAreNone) {
   EXPECT_FALSE(with([](CompactPart& p) { p.keys[0] = 30; }, false));
   EXPECT_FALSE(with([](CompactPart& p) { p.made = 4; }, false));
   EXPECT_FALSE(with([](CompactPart& p) { p.made = 9; }, false));
-  EXPECT_FALSE(with([](CompactPart& p) { p.inside = 5; }, false));
+  EXPECT_FALSE(with([](CompactPart& p) { p.copied = 5; }, false));
   EXPECT_TRUE(with([](CompactPart& p) { p.made = 6; }, false));  // one was merged
   EXPECT_FALSE(with([](CompactPart& p) { p.made = 6; }, true));
-  EXPECT_FALSE(with([](CompactPart& p) { p.inside = 3; }, true));
+  EXPECT_FALSE(with([](CompactPart& p) { p.copied = 3; }, true));
   EXPECT_FALSE(with([](CompactPart& p) { std::swap(p.keys[2], p.keys[3]); }, true));
   stand_ins = true;
   EXPECT_TRUE(is(false));  // of which none came

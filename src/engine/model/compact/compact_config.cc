@@ -17,7 +17,7 @@ constexpr const char* kPrefix = "option.";
 
 class MetadataWriter {
  public:
-  void Whole(const std::string& key, int64_t, int64_t, int64_t value) { metadata[kPrefix + key] = Cat(value); }
+  void Integer(const std::string& key, int64_t, int64_t, int64_t value) { metadata[kPrefix + key] = Cat(value); }
   void Flag(const std::string& key, bool value) { metadata[kPrefix + key] = value ? "true" : "false"; }
   void Number(const std::string& key, double, double, double value) {
     char text[32];
@@ -35,7 +35,7 @@ class MetadataReader {
  public:
   explicit MetadataReader(const std::map<std::string, std::string>& metadata) : metadata_(metadata) {}
 
-  void Whole(const std::string& key, int64_t low, int64_t high, int64_t& value) {
+  void Integer(const std::string& key, int64_t low, int64_t high, int64_t& value) {
     Parse(key, low, high, "a whole number", value);
   }
   void Number(const std::string& key, double low, double high, double& value) {

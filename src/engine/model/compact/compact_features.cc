@@ -9,7 +9,7 @@ namespace anchorsplat {
 
 namespace {
 
-// A length in units of p_LR, as half of its logarithm.
+// ½·ln of a length over p_LR, clamped.
 float HalfLog(float length_log, float pixel_log, float low, float high) {
   return std::clamp(0.5f * (length_log - pixel_log), low, high);
 }
@@ -24,11 +24,12 @@ void Difference(const float* from, const float* to, float* d) {
   for (int c = 0; c < 3; ++c) d[c] = to[c] - from[c];
 }
 
-// asinh, whose library function takes a third of an inference.
+// asinh; the library's takes a third of an inference.
 float Asinh(float x) { return std::copysign(std::log(std::abs(x) + std::sqrt(x * x + 1)), x); }
 
-// Far beyond anything the logarithms keep, and small enough that squares are finite.
+// Beyond all that clamped logarithms distinguish, and its square is finite.
 constexpr float kFarthest = 1e15f;
+// Keeps quotients by a pixel size finite in float.
 // Quotients by these stay away from what float cannot hold.
 constexpr float kSmallestPixel = 1e-20f, kLargestPixel = 1e20f;
 
@@ -115,7 +116,7 @@ void CompactFeatures::Edges(int64_t i, float* out) const {
     }
     out[3] = HalfLog(0.5f * std::log(Dot(d, d)), log_p, -3, 4);
 
-    // Σ_b λ_b v_b v_bᵀ, v_b: axis b of j in i's frame.
+    // Σ_b λ_b v_b v_bᵀ with v_b: axis b of j in i's frame.
     std::fill(out + 7, out + 13, 0.0f);
     const float* other_scales = cloud_.log_scales.data() + 3 * j;
     float cosine[3][3];

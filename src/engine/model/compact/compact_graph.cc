@@ -14,7 +14,7 @@ namespace anchorsplat {
 
 namespace {
 
-// Of Gaussian i, whose neighbours are known.
+// Computes the frame of Gaussian i from its neighbours.
 void FindFrame(const GaussianCloud& cloud, int64_t i, CompactGraph& graph) {
   const float* q = cloud.quats.data() + 4 * i;
   const float* scales = cloud.log_scales.data() + 3 * i;
@@ -72,7 +72,7 @@ void FindNearest(const GaussianCloud& cloud, CompactNeighbours& near) {
   });
 }
 
-// Along the Hilbert curve through the cloud's box; a last patch that is not full borrows the Gaussians before it.
+// Patches along the Hilbert curve through the cloud's box. A last patch that is not full borrows preceding Gaussians.
 void FindPatches(const GaussianCloud& cloud, CompactNeighbours& near) {
   const int64_t n = cloud.size(), m = near.neighbours;
   if (n == 0) return;

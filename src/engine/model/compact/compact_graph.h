@@ -10,39 +10,37 @@
 
 namespace anchorsplat {
 
-// Which Gaussians a Gaussian hears from, and the frame in which it sees them.
+// Neighbours and local frame of every Gaussian.
 //
-// A Gaussian's own frame are its three axes, longest first; of axes of one length the one stored first comes first. An
-// axis points to the side on which the neighbours lie: the sum of the directions to them has no negative component. So
-// the frame turns, moves and mirrors with the splat, and what is expressed in it does not change. It may be
-// left-handed.
+// A frame's axes are the Gaussian's own, longest first; axes of equal length keep their stored order. Signs are chosen
+// so that the sum of the unit vectors to the neighbours has no negative component. Frames therefore move, rotate and
+// mirror with the splat, and coordinates in them are invariant. A frame may be left-handed.
 struct CompactGraph {
   int64_t count = 0;            // N
   int64_t neighbours = 0;       // m = min(M, N − 1)
-  Buffer<int32_t> index;        // [N,m] by rising distance
+  Buffer<int32_t> index;        // [N,m] neighbours, nearest first
   Buffer<float> axes;           // [N,3,3] axis a of Gaussian i as a unit vector, world
-  Buffer<uint8_t> stored_axis;  // [N,3] which axis of the stored scales and of the quaternion it is
+  Buffer<uint8_t> stored_axis;  // [N,3] the axis's index in the stored scales and quaternion
   Buffer<float> sidedness;      // [N,3] mean of the unit vectors to the neighbours along each axis, 0–1
 
   const float* axis(int64_t i, int64_t a) const { return axes.data() + 9 * i + 3 * a; }
 };
 
-// The same neighbours without frames, for whoever works on one part of space after the other. A Gaussian's place is
-// that in an order in which near ones are near.
+// Neighbours without frames, for working through space block by block. Places number the Gaussians in a spatially
+// coherent order.
 struct CompactNeighbours {
   int64_t neighbours = 0;  // m = min(M, N − 1)
-  Buffer<int32_t> rows;    // [N] the Gaussian at each place
-  Buffer<int32_t> index;   // [N,m] places of the neighbours of the Gaussian at each place, by rising distance
+  Buffer<int32_t> rows;    // [N] Gaussian at each place
+  Buffer<int32_t> index;   // [N,m] places of its neighbours, nearest first
 };
 CompactNeighbours FindCompactNeighbours(const GaussianCloud& cloud, int64_t neighbours,
                                         CompactContext context = CompactContext::kNearest);
 
-// The cloud's values must be finite but for log-scales of −Inf; fewer than 2^31 Gaussians. The same bits for any number
-// of threads.
+// Values must be finite except log-scales of −Inf; fewer than 2^31 Gaussians. The same bits for any number of threads.
 CompactGraph BuildCompactGraph(const GaussianCloud& cloud, int64_t neighbours,
                                CompactContext context = CompactContext::kNearest);
 
-// The same where the neighbours are known: `index` [N,m]. A neighbour in a Gaussian's own place counts as none for its
+// As BuildCompactGraph, with known neighbours `index` [N,m]. A neighbour at the same position does not affect the
 // frame.
 CompactGraph GraphOfNeighbours(const GaussianCloud& cloud, int64_t neighbours, Buffer<int32_t> index);
 

@@ -26,7 +26,7 @@ class CompactNetwork::Loader {
     fingerprint_.AddWords(values);
     return values;
   }
-  std::string fingerprint() const { return fingerprint_.text(); }  // of all that has been read
+  std::string fingerprint() const { return fingerprint_.text(); }  // of everything read
   bool Has(const std::string& name) const {
     return std::any_of(tensors_.begin(), tensors_.end(), [&](const auto& t) { return t.name == name; });
   }
@@ -49,7 +49,7 @@ class CompactNetwork::Loader {
     return {};
   }
 
-  // The output layers of the attributes as one: rows in the order that WriteCopies reads.
+  // All attributes' output layers as one, rows in the order WriteCopies reads.
   Status Outputs(const CompactConfig& config, PackedWeights& out) const {
     const int64_t inputs = config.head_hidden, outputs = CompactOutputs(config), per_copy = ChannelsPerCopy(config);
     std::vector<float> weights(static_cast<size_t>(outputs * inputs)), biases(static_cast<size_t>(outputs));

@@ -24,7 +24,7 @@ namespace anchorsplat {
 
 namespace {
 
-// Gaussians whose messages are made at once: with 8 neighbours and 64 channels these are 256 KB and stay in the cache.
+// Gaussians whose messages are computed at once: 8 neighbours × 64 channels are 256 KB and stay in the cache.
 constexpr int64_t kRowsPerTask = 128;
 constexpr int64_t kMostRows = int64_t{1} << 31;
 
@@ -42,7 +42,7 @@ void ApplyLinear(int64_t rows, const float* input, const PackedWeights& weights,
 
 }  // namespace
 
-bool CompactNetwork::KnowsItsDomain() const {
+bool CompactNetwork::HasTrainingRange() const {
   for (size_t c = 0; c < low_.size(); ++c) {
     if (low_[c] > high_[c]) return false;
   }
@@ -82,7 +82,7 @@ void CompactNetwork::FindStates(const CompactFeatures& features, const CompactBl
   });
   for (size_t r = 0; r < rounds_.size(); ++r) {
     const Round& round = rounds_[r];
-    // What is heard in later rounds only counts among those that the block's own hear from until then.
+    // In each round only states that the block's own still depend on are updated.
     const int64_t listeners = block.reach[rounds_.size() - 1 - r], heard = block.reach[rounds_.size() - r];
     ApplyLinear(heard, states.data(), round.other, others.data());
     ParallelFor(0, listeners, kRowsPerTask, [&](int64_t begin, int64_t end) {
@@ -110,7 +110,7 @@ void CompactNetwork::FindStates(const CompactFeatures& features, const CompactBl
                    .out_stride = 3 * h,
                    .out = pooled.data() + h});
       ApplyLinear(rows, pooled.data(), round.update_first, own.data(), Activation::kGelu);
-      // In place: others were told about the old states before.
+      // In place: messages were computed from the old states before.
       ApplyLinear(rows, own.data(), round.update_second, own_states, Activation::kNone, own_states);
       normalise(rows, round.norm, own_states);
     });
@@ -155,18 +155,18 @@ float CompactNetwork::Fade(const float* node, const std::array<float, 3>& widths
   for (size_t c = 0; c < low_.size(); ++c) {
     if (low_[c] > high_[c]) continue;
     float value = node[c];
-    // A feature stops at its bounds, so the network cannot tell how far beyond a width lies. Where training had widths
-    // up to the bound, nobody knows how far they went.
+    // A bounded feature hides how far a width lies beyond the bound. If training reached the bound, its true range is
+    // unknown and the bounded feature decides; otherwise the unbounded width does.
     if (c < widths.size() && (widths[c] < value ? low_[c] > kLowestWidth : high_[c] < kHighestWidth)) value = widths[c];
     farthest = std::max({farthest, low_[c] - value, value - high_[c]});
   }
   return std::clamp((kFadeEnd - farthest) / (kFadeEnd - kFadeBegin), 0.0f, 1.0f);
 }
 
-float CompactNetwork::ShareOfLarge(const std::array<float, 3>& widths) const {
+float CompactNetwork::LargeGaussianFade(const std::array<float, 3>& widths) const {
   if (config_.copies == 1) return 1;
-  const float middle = 2 * widths[1];  // ln, pixels
-  return std::clamp((std::log(kVeryLarge) - middle) / std::log(kVeryLarge / kLarge), 0.0f, 1.0f);
+  const float middle = 2 * widths[1];  // ln(length in pixels)
+  return std::clamp((std::log(kLargeFadeEnd) - middle) / std::log(kLargeFadeEnd / kLargeFadeBegin), 0.0f, 1.0f);
 }
 
 namespace {
@@ -205,7 +205,7 @@ Status CheckTask(const GaussianCloud& cloud, const CompactTask& task, const Comp
   return {};
 }
 
-// Gaussians in the order of their places, with all that belongs to them.
+// The cloud and its per-Gaussian inputs, in spatially coherent order.
 struct NearCloud {
   Buffer<int32_t> rows;  // of the input
   GaussianCloud cloud;
@@ -237,49 +237,49 @@ NearCloud BringTogether(GaussianCloud cloud, const CompactTask& task, const Comp
   return near;
 }
 
-// In the place of a fade, of Gaussians of which nothing comes out.
+// Stands in for a fade: this Gaussian has no output.
 constexpr float kLeftOut = -1;
 
-// Where a block's Gaussians go in its part of the output: those that have copies before all others.
+// Output rows of a block's Gaussians: those with copies come first.
 struct BlockPlaces {
   Buffer<int32_t> rows;   // of the input, in this order
-  Buffer<int64_t> first;  // of each of the block's own, the row of its first copy
-  int64_t inside = 0;     // Gaussians that have copies
-  int64_t alone = 0;      // Gaussians that have none
-  int64_t made = 0;       // rows, with stand-ins
+  Buffer<int64_t> first;  // row of the first copy of each of the block's own
+  int64_t copied = 0;     // Gaussians with copies
+  int64_t uncopied = 0;   // Gaussians without
+  int64_t made = 0;       // rows, including stand-ins
 };
 
-// Whether Gaussians have stand-ins for their copies.
+// Whether copies get stand-ins.
 bool HasStandIns(const CompactTask& task, int64_t copies) {
   return task.stand_in != nullptr && copies > 1 && task.choice && !task.choice->copies;
 }
 
-// `each`: rows of one that has copies.
+// `each`: rows per Gaussian with copies.
 BlockPlaces PlacesOf(const CompactBlock& block, const Buffer<float>& fades, const Buffer<int32_t>& rows, int64_t each) {
   BlockPlaces places;
-  places.inside = std::ranges::count_if(fades, [](float fade) { return fade > 0; });
-  places.alone = std::ranges::count(fades, 0.0f);
-  places.made = each * places.inside + places.alone;
-  places.rows.resize(static_cast<size_t>(places.inside + places.alone));
+  places.copied = std::ranges::count_if(fades, [](float fade) { return fade > 0; });
+  places.uncopied = std::ranges::count(fades, 0.0f);
+  places.made = each * places.copied + places.uncopied;
+  places.rows.resize(static_cast<size_t>(places.copied + places.uncopied));
   places.first.resize(fades.size());
-  int64_t inside = 0, alone = places.inside;
+  int64_t next_copied = 0, next_uncopied = places.copied;
   for (size_t i = 0; i < fades.size(); ++i) {
     if (fades[i] == kLeftOut) continue;
-    const bool copied = fades[i] > 0;
-    const int64_t at = copied ? inside++ : alone++;
+    const bool has_copies = fades[i] > 0;
+    const int64_t at = has_copies ? next_copied++ : next_uncopied++;
     places.rows[static_cast<size_t>(at)] = rows[static_cast<size_t>(block.rows[i])];
-    places.first[i] = copied ? at : at + (each - 1) * places.inside;
+    places.first[i] = has_copies ? at : at + (each - 1) * places.copied;
   }
   return places;
 }
 
-// What the choice among a block's copies is told.
+// The block's copies, for the choice among them.
 CopyGroups GroupsOf(const CompactTask& task, const BlockPlaces& places, int64_t copies) {
-  CopyGroups groups{.count = places.inside, .copies = copies, .pixel_sizes = {}};
+  CopyGroups groups{.count = places.copied, .copies = copies, .pixel_sizes = {}};
   groups.stand_ins = HasStandIns(task, copies);
   const auto closer = [&](float pixel) { return static_cast<float>(pixel / task.upscale); };
   if (task.pixel_sizes.size() == 1) groups.pixel_sizes = {closer(task.pixel_sizes.front())};
-  for (int64_t g = 0; g < places.inside; ++g) {
+  for (int64_t g = 0; g < places.copied; ++g) {
     const int32_t row = places.rows[static_cast<size_t>(g)];
     if (task.pixel_sizes.size() > 1) groups.pixel_sizes.push_back(closer(task.pixel_sizes[static_cast<size_t>(row)]));
     if (!task.single.empty()) groups.single.push_back(std::ranges::binary_search(task.single, row) ? 1 : 0);
@@ -289,7 +289,7 @@ CopyGroups GroupsOf(const CompactTask& task, const BlockPlaces& places, int64_t 
 
 }  // namespace
 
-Buffer<float> CompactNetwork::Familiarity(const CompactFeatures& features, const CompactBlock& block) const {
+Buffer<float> CompactNetwork::TrainingFade(const CompactFeatures& features, const CompactBlock& block) const {
   Buffer<float> shares(static_cast<size_t>(block.own()));
   const int64_t told = NodeFeatures(config_);
   ParallelFor(0, block.own(), kRowsPerTask, [&](int64_t begin, int64_t end) {
@@ -369,8 +369,8 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
     result.times.neighbours = watch.Lap();
     Progress progress("Network", n);
     const auto add = [&](CopyGroups groups) {
-      result.outside += of_block.outside;
-      result.partly += of_block.partly;
+      result.unlike_training += of_block.unlike_training;
+      result.partly_unlike_training += of_block.partly_unlike_training;
       result.not_finite += of_block.not_finite;
       result.made += of_block.part.made;
       blocks.count() == 1 ? output.Take(std::move(of_block.part), std::move(groups))
@@ -387,15 +387,15 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
         ANCHORSPLAT_ASSIGN_OR_RETURN(const bool more, checkpoint->Next(near.cloud, of_block));
         if (!more) break;
         if (of_block.block < next || of_block.block >= blocks.count() ||
-            !IsOfBlock(of_block, at, task.block_gaussians, copies, output.waits(), stand_ins)) {
+            !FitsBlock(of_block, at, task.block_gaussians, copies, output.defers_merging(), stand_ins)) {
           return Error{ErrorCode::kBadFile, Cat(task.checkpoint.string(), ": block ", of_block.block,
                                                 " is none of this run's; -w starts over")};
         }
         CopyGroups groups;
-        if (output.waits()) {
+        if (output.defers_merging()) {
           BlockPlaces places;
-          places.inside = of_block.part.inside;
-          places.rows.assign(of_block.part.keys.begin(), of_block.part.keys.begin() + places.inside);
+          places.copied = of_block.part.copied;
+          places.rows.assign(of_block.part.keys.begin(), of_block.part.keys.begin() + places.copied);
           groups = GroupsOf(task, places, copies);
         }
         add(std::move(groups));
@@ -409,28 +409,28 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
     for (int64_t b = next; b < blocks.count(); ++b) {
       if (StopRequested()) return Error{ErrorCode::kInterrupted, "stopped"};
       const CompactBlock& block = blocks.Find(b);
-      Buffer<float> fades = Familiarity(features, block);
-      of_block.outside = of_block.partly = 0;
+      Buffer<float> fades = TrainingFade(features, block);
+      of_block.unlike_training = of_block.partly_unlike_training = 0;
       for (size_t i = 0; i < fades.size(); ++i) {
         const int32_t row = near.rows[static_cast<size_t>(block.rows[i])];
-        if (!task.inside.empty() && task.inside[static_cast<size_t>(row)] == 0) {
+        if (!task.in_region.empty() && task.in_region[static_cast<size_t>(row)] == 0) {
           fades[i] = kLeftOut;
           continue;
         }
-        if (fades[i] < 1) ++(fades[i] > 0 ? of_block.partly : of_block.outside);
-        fades[i] = std::min(fades[i], ShareOfLarge(features.Widths(block.rows[i])));
+        if (fades[i] < 1) ++(fades[i] > 0 ? of_block.partly_unlike_training : of_block.unlike_training);
+        fades[i] = std::min(fades[i], LargeGaussianFade(features.Widths(block.rows[i])));
       }
       const BlockPlaces places = PlacesOf(block, fades, near.rows, copies + (stand_ins ? 1 : 0));
       progress.Advance(block.own());
       if (places.made == 0) continue;
       made.Resize(places.made, near.cloud.sh_degree);
-      of_block.not_finite = Make(features, anchors, block, fades, places.first, places.inside, states, made);
+      of_block.not_finite = Make(features, anchors, block, fades, places.first, places.copied, states, made);
       if (stand_ins) {
-        Buffer<float> others = task.stand_in->Familiarity(features, block);
+        Buffer<float> others = task.stand_in->TrainingFade(features, block);
         Buffer<int64_t> rows = places.first;
         for (size_t i = 0; i < fades.size(); ++i) {
           if (!(fades[i] > 0)) others[i] = kLeftOut;
-          rows[i] += copies * places.inside;
+          rows[i] += copies * places.copied;
         }
         task.stand_in->Make(features, anchors, block, others, rows, 1, states, made);
       }

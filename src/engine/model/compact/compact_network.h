@@ -24,78 +24,76 @@
 
 namespace anchorsplat {
 
-// States of so many and of those around them stay in the caches of most machines.
+// Gaussians per block: its states and halo fit the caches of most machines.
 inline constexpr int64_t kCompactBlock = 65'536;
 
 class CompactNetwork;
 
-// What a compact network is asked for.
+// Input of CompactNetwork::Apply besides the cloud.
 struct CompactTask {
   std::span<const float> pixel_sizes;  // p_LR, world units, one for all or one per Gaussian
   double upscale = 4;                  // u ≥ 1
-  double strength = 0;                 // f of the filter that residuals are added to, > 0
-  // Gaussians whose states are kept at a time, besides those that they hear from; > 0. Changes no bit of the result.
+  double strength = 0;                 // f of the filter under the residuals, ≥ 0
+  // Gaussians processed at a time, not counting their halo; > 0. Does not change the result.
   int64_t block_gaussians = kCompactBlock;
-  // Which copies live; nothing: all of them.
+  // How many copies stay; unset: all.
   std::optional<CopyChoice> choice = std::nullopt;
-  // Gaussians of which one copy stays where costs choose, ascending.
+  // Ascending rows of Gaussians that keep one copy when costs decide.
   std::span<const int64_t> single = {};
-  // Makes one Gaussian of one, which may stand in for all the copies where costs choose and no number of copies is
-  // given; of the same neighbours, rounds, context and features as the network itself. Nothing: none does.
+  // A one-copy network whose output may replace all copies of a Gaussian, when costs decide and the number of copies is
+  // not set. Must have the same neighbours, rounds, context and features. May be null.
   const CompactNetwork* stand_in = nullptr;
-  // 0: a Gaussian that others hear from and of which nothing comes out; one per Gaussian, empty: none.
-  std::span<const char> inside = {};
-  // Where what the blocks have made is kept, for a run that ends before its end; empty: nowhere.
+  // One per Gaussian; 0: serves only as a neighbour, produces no output. Empty: all produce output.
+  std::span<const char> in_region = {};
+  // Where finished blocks are saved for resuming; empty: nowhere.
   std::filesystem::path checkpoint = {};
-  bool resume = false;  // go on from `checkpoint` if it is there
+  bool resume = false;  // resume from `checkpoint` if it exists
 };
 
 struct CompactResult {
-  // Copy k of all anchors before copy k + 1, then stand-ins and those that stayed alone; the input's metadata.
+  // Copy k of all anchors precedes copy k + 1; then come stand-ins and Gaussians that were not copied. Keeps metadata.
   GaussianCloud cloud;
-  int64_t outside = 0;     // Gaussians unlike the training data: filtered, and nothing else
-  int64_t partly = 0;      // Gaussians somewhat unlike it: a part of the residual
-  int64_t not_finite = 0;  // Gaussians for which the network says something that is not finite: its start
-  int64_t made = 0;        // Gaussians before the choice among copies
-  int64_t resumed = 0;     // blocks that a checkpoint brought
+  int64_t unlike_training = 0;         // Gaussians unlike the training data, only filtered
+  int64_t partly_unlike_training = 0;  // Gaussians somewhat unlike it, with a reduced residual
+  int64_t not_finite = 0;              // Gaussians with non-finite network output, left at their initial copies
+  int64_t made = 0;                    // Gaussians before copies were merged
+  int64_t resumed = 0;                 // blocks read from the checkpoint
   ChosenCopies chosen;
   struct {
     double neighbours = 0, network = 0, copies = 0, order = 0;  // seconds
   } times;
 };
 
-// A compact network for inference on the CPU, as a row of kernel calls on raw arrays. The torch module in torch/
-// is the same network for training; a test holds the two together.
+// A compact network for CPU inference, as kernel calls on raw arrays. torch/ has the same network for training; a test
+// compares the two.
 //
-// Where the network comes from knows the range of every feature of the Gaussians it was trained on. A Gaussian outside
-// of it keeps a part of the residual that falls from 1 to 0 with its distance (kFadeBegin to kFadeEnd, in feature units
-// of model/compact/compact_features.h; widths count as they are, beyond the bounds of their features too); at 0 it is
-// what the filter makes of it, one Gaussian.
+// The weights file stores the range of every feature in training. Outside that range a Gaussian's residual fades from 1
+// to 0 with distance (kFadeBegin to kFadeEnd, in feature units of model/compact/compact_features.h; widths are measured
+// without their features' bounds). At 0 the Gaussian is only filtered and not copied.
 //
-// A network that makes several copies says less of Gaussians whose middle axis measures more than kLarge pixels, too,
-// and nothing from kVeryLarge on: pixels hid nothing of these, and copies whose centres lie far apart may come before
-// or behind others than one did, and show what it hid.
+// With several copies, the residual also fades for Gaussians whose middle axis is longer than kLargeFadeBegin pixels,
+// to 0 at kLargeFadeEnd. Pixels hid nothing of such Gaussians, and widely separated copies would change the depth order
+// and show what the Gaussian hid.
 class CompactNetwork {
  public:
   // Errors: of Validate(config) and of `source`; kBadFile naming the tensor when a weight is NaN or infinite.
   static Result<CompactNetwork> Load(const CompactConfig& config, const WeightSource& source);
 
   const CompactConfig& config() const { return config_; }
-  // False when the range of a feature in training is not known, so that nothing lies outside of it.
-  bool KnowsItsDomain() const;
-  // The least and the greatest upscale it was trained for; least above greatest: not known.
+  // Whether the feature range of training is known. If not, no Gaussian counts as outside it.
+  bool HasTrainingRange() const;
+  // Smallest and largest upscale in training; smallest > largest if unknown.
   std::pair<double, double> TrainedUpscales() const;
 
   // Enhances a cloud of finite values (log-scales and opacity logits may be −Inf). The same bits for any number of
-  // threads. Needs about 1.5 KB per Gaussian of a block, and 150 bytes of Buffers per Gaussian of the cloud, besides
-  // the cloud, which is given back before the result is put in order, and twice the result. Errors (kBadArgument): of
-  // Validate(cloud) and Validate(choice); no Gaussians or 2^31 rows; a wrong number of pixel sizes, one that is not
-  // positive and finite; upscale below 1; a strength that is negative; a stand-in of another shape; more output than
-  // memory holds. Of the checkpoint: those of CompactCheckpoint. kInterrupted: the user stopped it; the checkpoint
-  // stays.
+  // threads. Memory: about 1.5 KB per Gaussian of a block, 150 bytes of Buffers per Gaussian of the cloud, the cloud
+  // (freed before the result is sorted) and twice the result.
+  // Errors (kBadArgument): those of Validate(cloud) and Validate(choice); no Gaussians or 2^31 rows; a wrong number of
+  // pixel sizes, or one not positive and finite; upscale below 1; negative strength; a stand-in of another shape;
+  // output larger than memory. Those of CompactCheckpoint. kInterrupted if the user stopped it; the checkpoint stays.
   Result<CompactResult> Apply(GaussianCloud cloud, const CompactTask& task) const;
 
-  // The raw outputs [N, CompactOutputs(config())] for the features of a cloud, before bounds and fading.
+  // Raw outputs [N, CompactOutputs(config())] for a cloud's features, before bounds and fading.
   void Outputs(const CompactFeatures& features, const CompactGraph& graph, float* out) const;
 
  private:
@@ -108,26 +106,26 @@ class CompactNetwork {
   };
   class Loader;
 
-  // Of a block's Gaussians, [rows,H]; its memory serves one block after the other.
+  // States of a block's Gaussians, [rows,H]. Memory is reused across blocks.
   struct States {
-    Buffer<float> own;     // of the block's own Gaussians these are after all rounds
-    Buffer<float> others;  // what others are told of them
+    Buffer<float> own;     // final states, for the block's own Gaussians
+    Buffer<float> others;  // messages to neighbours
   };
   void FindStates(const CompactFeatures& features, const CompactBlock& block, int64_t neighbours, States& states) const;
-  // Of the block's own Gaussians begin to end.
+  // Raw outputs for the block's own Gaussians [begin, end).
   void Head(const CompactFeatures& features, const CompactBlock& block, const States& states, int64_t begin,
             int64_t end, float* out) const;
-  // Writes what the network makes of a block's own Gaussians into `made`: copies where the fade is more than 0, what
-  // the filter makes where it is 0, nothing where it is below. `first`: the row of the first copy of each, `stride`:
-  // from one copy to the next. Returns how many it says something not finite about.
+  // Writes a block's own Gaussians to `made`: copies where fade > 0, the filtered Gaussian where it is 0, nothing where
+  // it is negative. `first`: row of each one's first copy; `stride`: rows between copies. Returns how many have
+  // non-finite network output.
   int64_t Make(const CompactFeatures& features, const CompactAnchors& anchors, const CompactBlock& block,
                std::span<const float> fades, std::span<const int64_t> first, int64_t stride, States& states,
                GaussianCloud& made) const;
-  // Of a block's own Gaussians: 1 within the range of the training data, 0 far outside.
-  Buffer<float> Familiarity(const CompactFeatures& features, const CompactBlock& block) const;
+  // For a block's own Gaussians: 1 within the feature range of training, 0 far outside.
+  Buffer<float> TrainingFade(const CompactFeatures& features, const CompactBlock& block) const;
   float Fade(const float* node, const std::array<float, 3>& widths) const;
-  // Of the residual that a Gaussian of such widths (half logarithms, pixels) keeps.
-  float ShareOfLarge(const std::array<float, 3>& widths) const;
+  // Share of the residual kept at these widths (half logarithms, pixels).
+  float LargeGaussianFade(const std::array<float, 3>& widths) const;
 
   CompactConfig config_;
   std::string fingerprint_;  // of the configuration and all weights
@@ -135,17 +133,18 @@ class CompactNetwork {
   Norm embed_norm_;
   std::vector<Round> rounds_;
   PackedWeights head_first_, head_second_, out_;
-  std::vector<float> low_, high_;  // of the features in training; low above high: not known, nothing is outside
+  std::vector<float> low_, high_;  // feature range of training; low above high: unknown, nothing is outside
 };
 
 inline constexpr float kFadeBegin = 0.25f, kFadeEnd = 0.75f;
-inline constexpr float kLarge = 4, kVeryLarge = 8;
+// Width of the middle axis between which the residual fades, pixels.
+inline constexpr float kLargeFadeBegin = 4, kLargeFadeEnd = 8;
 
-// True when the metadata of a tensor file is that of a compact network.
+// Whether a tensor file's metadata names a compact network.
 bool IsCompactNetwork(const TensorFile& file);
 
-// The network of a file, fully checked. Errors (kBadFile with the file's name): of CompactConfigFromMetadata; tensors
-// missing, of another shape, or that belong to nothing; values that are not finite.
+// Loads and validates a network. Errors (kBadFile with the file's name): those of CompactConfigFromMetadata; tensors
+// missing, unknown or of the wrong shape; non-finite values.
 Result<CompactNetwork> LoadCompactNetwork(const TensorFile& file);
 
 }  // namespace anchorsplat

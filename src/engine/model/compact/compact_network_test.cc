@@ -156,8 +156,8 @@ TEST(CompactNetwork, GaussiansUnlikeTheTrainingDataAreFilteredAndStayAlone) {
   };
   const auto result = Network({}, domain).Apply(cloud, Task());
   ASSERT_TRUE(result.ok());
-  EXPECT_EQ(result->outside, 1);
-  EXPECT_EQ(result->partly, 1);
+  EXPECT_EQ(result->unlike_training, 1);
+  EXPECT_EQ(result->partly_unlike_training, 1);
   ASSERT_EQ(result->cloud.size(), 4 * 99 + 1);
   ASSERT_TRUE(ApplyFilter(cloud, {&kPixel, 1}, {.upscale = 4, .strength = {}}).ok());
   const size_t last = 4 * 99;
@@ -186,13 +186,13 @@ TEST(CompactNetwork, WidthsBeyondTheFeaturesBoundsAreUnlikeTheTrainingData) {
     for (float& s : cloud.log_scales) s = std::log(kPixel * width);
     const auto result = network.Apply(cloud, Task());
     ASSERT_TRUE(result.ok());
-    EXPECT_EQ(result->outside, 60) << width;
+    EXPECT_EQ(result->unlike_training, 60) << width;
   }
   // Trained up to the bounds: nobody knows how far beyond.
   const CompactNetwork wide = Network({}, range(kLowestWidth, kHighestWidth));
   GaussianCloud cloud = SheetCloud(60);
   for (float& s : cloud.log_scales) s = std::log(kPixel) - 12;
-  EXPECT_EQ(wide.Apply(cloud, Task())->outside, 0);
+  EXPECT_EQ(wide.Apply(cloud, Task())->unlike_training, 0);
 }
 
 // Their copies might come before what was in front of them.
@@ -207,12 +207,12 @@ TEST(CompactNetwork, WhatIsWiderThanPixelsStaysOne) {
     }
     const auto result = network.Apply(cloud, Task());
     EXPECT_TRUE(result.ok());
-    EXPECT_EQ(result->outside + result->partly, 0) << "it is nothing that training had not";
+    EXPECT_EQ(result->unlike_training + result->partly_unlike_training, 0) << "it is nothing that training had not";
     return result.ok() ? result->cloud : GaussianCloud{};
   };
-  EXPECT_EQ(made(kLarge - 1).size(), 4 * 60);
-  EXPECT_EQ(made(kVeryLarge + 1).size(), 60);
-  const GaussianCloud half = made(0.5f * (kLarge + kVeryLarge));
+  EXPECT_EQ(made(kLargeFadeBegin - 1).size(), 4 * 60);
+  EXPECT_EQ(made(kLargeFadeEnd + 1).size(), 60);
+  const GaussianCloud half = made(0.5f * (kLargeFadeBegin + kLargeFadeEnd));
   EXPECT_EQ(half.size(), 4 * 60) << "copies that have hardly moved";
   // One of several copies only: what makes one of each moves nothing apart.
   const CompactNetwork single = Network({.copies = 1});
@@ -220,7 +220,7 @@ TEST(CompactNetwork, WhatIsWiderThanPixelsStaysOne) {
   for (float& s : cloud.log_scales) s = std::log(kPixel * 10);
   const auto same = single.Apply(cloud, Task());
   ASSERT_TRUE(same.ok());
-  EXPECT_EQ(same->outside, 0);
+  EXPECT_EQ(same->unlike_training, 0);
   EXPECT_NE(std::vector<float>(same->cloud.sh.begin(), same->cloud.sh.end()),
             std::vector<float>(cloud.sh.begin(), cloud.sh.end()));
 }
@@ -287,7 +287,7 @@ class CompactFile {
     EXPECT_EQ(IsCompactNetwork(*file), metadata.contains("format"));
     const auto network = LoadCompactNetwork(*file);
     if (network.ok()) {
-      knows_its_domain_ = network->KnowsItsDomain();
+      knows_its_domain_ = network->HasTrainingRange();
       return "";
     }
     EXPECT_EQ(network.error().code, ErrorCode::kBadFile);

@@ -18,7 +18,7 @@ constexpr int64_t kPieceRows = int64_t{1} << 20;
 // Floats per Gaussian of kCloudArrays.
 std::array<int64_t, 5> Widths(const GaussianCloud& cloud) { return {3, 3, 4, 1, cloud.sh_stride()}; }
 
-// How many keys are less than another.
+// Counts the keys less than a given one.
 class Ranks {
  public:
   explicit Ranks(int64_t keys) : bits_(static_cast<size_t>((keys + 63) / 64), 0) {}
@@ -47,9 +47,9 @@ CompactOutput::CompactOutput(int64_t count, int64_t copies, const CopyChoice& ch
     : count_(count),
       copies_(copies),
       choice_(choice),
-      waits_(choice.max_gaussians > 0 && choice.max_gaussians < count * copies),
-      merges_(copies > 1 && (waits_ || choice.copies != copies)) {
-  if (!waits_) choice_.max_gaussians = 0;
+      defers_merging_(choice.max_gaussians > 0 && choice.max_gaussians < count * copies),
+      merges_(copies > 1 && (defers_merging_ || choice.copies != copies)) {
+  if (!defers_merging_) choice_.max_gaussians = 0;
 }
 
 CompactOutput::Piece& CompactOutput::PieceFor(int64_t rows, const GaussianCloud& block) {
@@ -77,21 +77,21 @@ void CompactOutput::Add(const Buffer<int32_t>& rows, CopyGroups groups, Gaussian
 
 void CompactOutput::Merge(const Buffer<int32_t>& rows, CopyGroups& groups, CompactPart& part) {
   GaussianCloud& block = part.cloud;
-  part.inside = groups.count;
-  part.made = block.size() - (groups.stand_ins ? part.inside : 0);
+  part.copied = groups.count;
+  part.made = block.size() - (groups.stand_ins ? part.copied : 0);
   part.keys.clear();
   for (int64_t k = 0; k < copies_ + (groups.stand_ins ? 1 : 0); ++k) {
-    for (int64_t g = 0; g < part.inside; ++g) part.keys.push_back(k * count_ + rows[static_cast<size_t>(g)]);
+    for (int64_t g = 0; g < part.copied; ++g) part.keys.push_back(k * count_ + rows[static_cast<size_t>(g)]);
   }
-  for (auto alone = static_cast<size_t>(part.inside); alone < rows.size(); ++alone) {
+  for (auto alone = static_cast<size_t>(part.copied); alone < rows.size(); ++alone) {
     part.keys.push_back(copies_ * count_ + rows[alone]);
   }
-  if (!merges_ || waits_ || part.inside == 0) return;
+  if (!merges_ || defers_merging_ || part.copied == 0) return;
   const bool stand_ins = groups.stand_ins;
   const CopyPlan plan(std::move(groups), choice_, block);
   if (plan.merged() == 0 && !stand_ins) return;
   std::vector<char> keep(static_cast<size_t>(block.size()), 1);
-  plan.Carry(block, keep);
+  plan.ApplyTo(block, keep);
   KeepMarked(keep, block);
   KeepRows(part.keys, 1, keep);
 }
@@ -112,29 +112,29 @@ void CompactOutput::Take(CompactPart part, CopyGroups groups) {
   Plan(part, 0, std::move(groups));
 }
 
-// Of the part that has come last, which begins at row `first` of the last piece: plans its merges, where they wait.
+// Plans the merges of the part added last, if deferred. It begins at row `first` of the last piece.
 void CompactOutput::Plan(const CompactPart& part, int64_t first, CopyGroups groups) {
   made_ += part.made;
-  if (!merges_ || !waits_ || part.inside == 0) return;
+  if (!merges_ || !defers_merging_ || part.copied == 0) return;
   const Piece& piece = pieces_.back();
   groups.first = first;
   plans_.emplace_back(std::move(groups), choice_, piece.cloud);
   piece_of_plan_.push_back(pieces_.size() - 1);
   const auto keys = piece.keys.begin() + first;
-  rows_of_plan_.emplace_back(keys, keys + part.inside);  // of copy 0
+  rows_of_plan_.emplace_back(keys, keys + part.copied);  // of copy 0
 }
 
 void CompactOutput::MergeAll() {
   int64_t merged = 0;
   for (const CopyPlan& plan : plans_) merged += plan.merged();
-  if (const int64_t over = made_ - merged - choice_.max_gaussians; waits_ && over > 0) {
+  if (const int64_t over = made_ - merged - choice_.max_gaussians; defers_merging_ && over > 0) {
     MergeMore(plans_, over,
               [&](size_t plan, int64_t group) { return int64_t{rows_of_plan_[plan][static_cast<size_t>(group)]}; });
   }
   for (size_t p = 0, first = 0; p < pieces_.size(); ++p) {
     Piece& piece = pieces_[p];
     std::vector<char> keep(static_cast<size_t>(piece.cloud.size()), 1);
-    for (; first < plans_.size() && piece_of_plan_[first] == p; ++first) plans_[first].Carry(piece.cloud, keep);
+    for (; first < plans_.size() && piece_of_plan_[first] == p; ++first) plans_[first].ApplyTo(piece.cloud, keep);
     KeepMarked(keep, piece.cloud);
     KeepRows(piece.keys, 1, keep);
   }
@@ -167,7 +167,7 @@ GaussianCloud CompactOutput::Finish(ChosenCopies& chosen) {
     for (Piece& piece : pieces_) piece.cloud.*kCloudArrays[a] = {};
   }
   chosen.merged = made_ - total;
-  chosen.left_out = LeaveOutLeastVisible(choice_.max_gaussians, out);
+  chosen.left_out = DropLeastVisible(choice_.max_gaussians, out);
   pieces_.clear();
   return out;
 }

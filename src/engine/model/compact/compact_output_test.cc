@@ -73,9 +73,9 @@ TEST(CompactOutput, BlocksAreChosenAsTheWhole) {
                      .strength = DefaultFilterStrength(4)};
     const auto all = network.Apply(cloud, task);
     ASSERT_TRUE(all.ok());
-    ASSERT_EQ(all->outside, 18);
+    ASSERT_EQ(all->unlike_training, 18);
     for (const CopyChoice& choice : choices) {
-      const int64_t inside = kCount - all->outside;
+      const int64_t inside = kCount - all->unlike_training;
       CopyGroups groups{.count = inside, .copies = 4, .pixel_sizes = {}};
       for (int64_t i = 0; i < kCount; ++i) {
         if (i % 50 == 5) continue;  // stays alone
@@ -93,7 +93,7 @@ TEST(CompactOutput, BlocksAreChosenAsTheWhole) {
         task.block_gaussians = block;
         const auto blocks = network.Apply(cloud, task);
         ASSERT_TRUE(blocks.ok());
-        EXPECT_EQ(blocks->made, 4 * inside + all->outside);
+        EXPECT_EQ(blocks->made, 4 * inside + all->unlike_training);
         EXPECT_EQ(blocks->chosen.merged, chosen->merged);
         EXPECT_EQ(blocks->chosen.left_out, chosen->left_out);
         ExpectSameValues(blocks->cloud, expected);
@@ -116,7 +116,7 @@ TEST(CompactOutput, StandInsAreChosenAsInTheWhole) {
   const auto all = network.Apply(cloud, task), stand_ins = one->Apply(cloud, task);
   ASSERT_TRUE(all.ok() && stand_ins.ok());
   ASSERT_EQ(stand_ins->cloud.size(), kCount);
-  const int64_t inside = kCount - all->outside;
+  const int64_t inside = kCount - all->unlike_training;
   std::vector<int64_t> rows, of_stand_ins;
   for (int64_t i = 0; i < 4 * inside; ++i) rows.push_back(i);
   for (int64_t i = 0; i < kCount; ++i) {
@@ -132,7 +132,7 @@ TEST(CompactOutput, StandInsAreChosenAsInTheWhole) {
     GaussianCloud expected = copies;
     CopyGroups groups{.count = inside, .copies = 4, .pixel_sizes = {pixel / 4}, .stand_ins = true};
     CopyChoice of_copies = choice;
-    if (of_copies.max_gaussians > 0) of_copies.max_gaussians -= all->outside;
+    if (of_copies.max_gaussians > 0) of_copies.max_gaussians -= all->unlike_training;
     ASSERT_TRUE(ChooseCopies(groups, of_copies, expected).ok());
     task.choice = choice;
     for (const int64_t block : {int64_t{97}, int64_t{400}, kCount}) {
@@ -140,7 +140,7 @@ TEST(CompactOutput, StandInsAreChosenAsInTheWhole) {
       task.block_gaussians = block;
       const auto blocks = network.Apply(cloud, task);
       ASSERT_TRUE(blocks.ok());
-      EXPECT_EQ(blocks->made, 4 * inside + all->outside);
+      EXPECT_EQ(blocks->made, 4 * inside + all->unlike_training);
       EXPECT_EQ(blocks->chosen.merged, blocks->made - blocks->cloud.size());
       // Without those that stand alone, which are put in order among the stand-ins.
       std::vector<int64_t> others;
@@ -202,7 +202,7 @@ TEST(CompactOutput, OnlyThoseInsideComeOut) {
       ++row;
     }
   }
-  task.inside = inside;
+  task.in_region = inside;
   for (const int64_t block : {int64_t{97}, kCount}) {
     task.block_gaussians = block;
     const auto part = network.Apply(cloud, task);
@@ -232,7 +232,7 @@ TEST(MergeMore, GoesByTheOrderOfTheGaussians) {
   const std::vector<std::vector<char>> expected = {{1, 1, 1, 1, 1, 0}, {1, 1, 1, 1, 1, 0}};
   for (size_t p = 0; p < 2; ++p) {
     std::vector<char> keep(6, 1);
-    plans[p].Carry(clouds[p], keep);
+    plans[p].ApplyTo(clouds[p], keep);
     EXPECT_EQ(plans[p].merged(), 1);
     EXPECT_EQ(keep, expected[p]);
   }

@@ -19,8 +19,7 @@ double Bounded(const CompactAttribute& attribute, double y) {
   return attribute.bound * std::tanh(attribute.gain * y / attribute.bound);
 }
 
-// The filtered lengths of a Gaussian, longest axis first, as logarithms. `y`: what the network says
-// about f.
+// Log-scales of the filtered Gaussian, longest axis first. `y`: the network's output for f.
 Vector FilteredLogScales(const CompactConfig& config, const CompactAnchors& anchors, int64_t i, double p, double y) {
   const uint8_t* stored = anchors.graph->stored_axis.data() + 3 * i;
   const float* scales = anchors.cloud->log_scales.data() + 3 * i;
@@ -50,7 +49,7 @@ Vector OffsetUnits(const CompactConfig& config, const CompactAnchors& anchors, c
 // The frame of a Gaussian: three axes, longest first, row by row.
 struct Frame {
   const float* axis;
-  double handedness;  // −1 where it is mirrored: turning by a vector of the frame is, too
+  double handedness;  // −1 for a mirrored frame, in which rotation vectors change sign
 
   explicit Frame(const float* rows) : axis(rows) {
     const double triple = (rows[1] * rows[5] - rows[2] * rows[4]) * rows[6] +
@@ -82,7 +81,7 @@ Quaternion UnitQuaternion(const GaussianCloud& cloud, int64_t i) {
   return quat;
 }
 
-// `quat` turned by 2·atan(|t|/2) about t: the rotation's quaternion is (1, t/2) up to its norm.
+// `quat` rotated by 2·atan(|t|/2) about t: that rotation is (1, t/2) up to its norm.
 void WriteTurned(const Quaternion& quat, const Vector& t, float* out) {
   const double x = t[0] / 2, y = t[1] / 2, z = t[2] / 2;
   const double inverse = 1 / std::sqrt(1 + x * x + y * y + z * z);
@@ -92,7 +91,7 @@ void WriteTurned(const Quaternion& quat, const Vector& t, float* out) {
   out[3] = static_cast<float>(inverse * (quat[3] + x * quat[2] - y * quat[1] + z * quat[0]));
 }
 
-// Takes the outputs of one copy one after the other.
+// Reads the outputs of one copy in order.
 class Outputs {
  public:
   Outputs(const float* values, double fade) : next_(values), fade_(fade) {}
@@ -104,7 +103,7 @@ class Outputs {
   double fade_;
 };
 
-// A copy's colours: those of the Gaussian with another mean, gains per degree, and a gradient across the sphere.
+// A copy's SH: the Gaussian's with a new mean, a gain per degree and a gradient across the sphere.
 void WriteHarmonics(const CompactConfig& config, const GaussianCloud& cloud, const Frame& frame, const float* sh,
                     Outputs& y, float* out) {
   std::copy_n(sh, cloud.sh_stride(), out);
@@ -159,7 +158,7 @@ void WriteCopies(const CompactConfig& config, const CopyStart& start, const Comp
       if (a < 2) offset[a] += start.offset(k)[a] * std::exp(log_scale[a]);
     }
     Vector shift = frame.ToWorld(offset);
-    // Scales that float holds as logarithms but not as lengths leave no place to go to.
+    // A log-scale may be too large to be a length in float; then the copy is not moved.
     if (!std::all_of(shift.begin(), shift.end(), [](double v) { return std::abs(v) < 1e30; })) shift = {0, 0, 0};
     float* out_scales = out.log_scales.data() + 3 * row;
     for (size_t a = 0; a < 3; ++a) {
@@ -170,7 +169,7 @@ void WriteCopies(const CompactConfig& config, const CopyStart& start, const Comp
     for (size_t a = 0; a < 3; ++a) turn[a] = frame.handedness * y.Next(kCopyAttributes[2]);
     WriteTurned(quat, frame.ToWorld(turn), out.quats.data() + 4 * row);
     const double logit = shape.opacity_logit + y.Next(kCopyAttributes[3]);
-    // K copies of something that float can hardly hold as a logit; −Inf stays, as the cloud may have it.
+    // Keeps the logit of each of K copies within float; −Inf is kept, as clouds may have it.
     out.opacity_logits[static_cast<size_t>(row)] =
         static_cast<float>(std::isinf(cloud.opacity_logits[at]) ? logit : std::clamp(logit, -1e30, 1e30));
     WriteHarmonics(config, cloud, frame, cloud.sh.data() + i * cloud.sh_stride(), y,

@@ -10,7 +10,7 @@ namespace anchorsplat {
 
 namespace {
 
-// The narrowest a copy may become along an axis, in standard deviations: only reached by spreads above 0.7.
+// Lower bound of s, reached only for spreads above 0.7.
 constexpr double kNarrowest = 0.5;
 
 }  // namespace
@@ -27,7 +27,7 @@ CopyStart::CopyStart(int64_t copies, double spread) : offsets_(static_cast<size_
     offsets_ = {{spread, spread}, {spread, -spread}, {-spread, spread}, {-spread, -spread}};
     return;
   }
-  // A sunflower fills the disc evenly for every K; made round to second order.
+  // A sunflower spiral fills the disc evenly for every K; below it is made isotropic to second order.
   const double golden = std::numbers::pi * (3 - std::sqrt(5.0));
   const auto count = static_cast<double>(copies);
   double mean[2] = {0, 0}, square[2] = {0, 0}, product = 0;
@@ -41,7 +41,7 @@ CopyStart::CopyStart(int64_t copies, double spread) : offsets_(static_cast<size_
     for (size_t a = 0; a < 2; ++a) square[a] += offset[a] * offset[a] / count;
     product += offset[0] * offset[1] / count;
   }
-  // Cholesky's triangle of the covariance, inverted, takes the correlation away.
+  // The inverse Cholesky factor of the covariance removes the correlation.
   const double first = std::sqrt(square[0]), slope = product / first;
   const double second = std::sqrt(square[1] - slope * slope);
   for (auto& offset : offsets_) {

@@ -13,14 +13,14 @@ namespace {
 
 constexpr int64_t kGroupsPerTask = 256;
 
-// Goes on with the next step? `alive`: before it.
+// Whether to take the next step. `alive`: copies before it.
 bool IsWanted(const CopyChoice& choice, int64_t alive, float cost) {
   return choice.copies ? alive > *choice.copies : cost <= choice.merge_cost;
 }
 
-// Makes the last of the steps one that brings a stand-in, at `cost` instead of what all steps to one copy cost: from
-// where the cost per Gaussian is greatest, which is where the hull of all costs goes to it, each of the steps that are
-// left costs its part. Where the steps cost no more, they stay.
+// Appends the stand-in to the merge steps. `cost`: of the stand-in, replacing the total of all steps down to one copy.
+// If the steps cost no more, they stay. Otherwise the remaining cost is spread evenly over the steps from the point
+// where it is steepest, which is where the convex hull of the costs meets the stand-in.
 void EndWithStandIn(double cost, std::span<CopyGroup::Step> steps) {
   double before = 0, greatest = -1;
   size_t from = 0;
@@ -52,7 +52,7 @@ Status Validate(const CopyChoice& choice, int64_t made) {
   return {};
 }
 
-// Steps stand in the order in which a group would go on, so that what they cost never falls.
+// Step costs become non-decreasing, in the order in which a group takes them.
 CopyPlan::CopyPlan(CopyGroups groups, const CopyChoice& choice, const GaussianCloud& cloud)
     : groups_(std::move(groups)),
       invisible_(choice.invisible),
@@ -75,7 +75,7 @@ CopyPlan::CopyPlan(CopyGroups groups, const CopyChoice& choice, const GaussianCl
         wanted = wanted && (single || IsWanted(choice, group.alive(), step->cost));
         if (wanted) ++chosen;
         if (!wanted && !all_steps) break;
-        group.Do(*step);
+        group.Apply(*step);
       }
       if (!groups_.stand_ins || groups_.copies == 1) continue;
       const double cost = kStandInShare * group.CostOfStandIn(cloud, StandInOf(g));
@@ -97,7 +97,7 @@ int64_t CopyPlan::merged() const {
   return sum;
 }
 
-void CopyPlan::Carry(GaussianCloud& cloud, std::vector<char>& keep, std::vector<int64_t>* into) const {
+void CopyPlan::ApplyTo(GaussianCloud& cloud, std::vector<char>& keep, std::vector<int64_t>* into) const {
   ParallelFor(0, groups_.count, kGroupsPerTask, [&](int64_t begin, int64_t end) {
     CopyGroup group(groups_.copies, invisible_);
     for (int64_t g = begin; g < end; ++g) {
@@ -111,7 +111,7 @@ void CopyPlan::Carry(GaussianCloud& cloud, std::vector<char>& keep, std::vector<
       if (groups_.stand_ins) keep[static_cast<size_t>(StandInOf(g))] = 0;
       if (chosen == 0) continue;
       group.Load(cloud, groups_.first + g, groups_.count, groups_.copies, PixelOf(g), /*colors=*/false);
-      for (int64_t s = 0; s < chosen; ++s) group.Do(StepsOf(g)[s]);
+      for (int64_t s = 0; s < chosen; ++s) group.Apply(StepsOf(g)[s]);
       group.Write(cloud, keep, into);
     }
   });

@@ -13,58 +13,56 @@
 
 namespace anchorsplat {
 
-// What a merge may cost where nobody says otherwise: pixels of the closer view times the square of a colour in 0–1, of
-// MergeCost(). Chosen on training objects (docs/results/copies.md).
+// Default maximum cost of a merge (MergeCost): closer-view pixels × squared colour difference, colours 0–1. Chosen on
+// training objects (docs/results/copies.md).
 inline constexpr double kMergeCost = 1e-4;
-// Of the network for standard fits: each Gaussian that goes costs them less.
+// Default for the network for standard fits, which lose less per removed Gaussian.
 inline constexpr double kMergeCostOfStandard = 1e-3;
-// Where refinement goes on: what it begins with has to show all, and is split again.
+// Default when refinement follows: its starting splat must show everything and is densified again.
 inline constexpr double kMergeCostOfStart = 2e-5;
 
-// What a stand-in's difference from the copies counts for. It was trained to look like the truth and not like them, so
-// that most of the difference is none of the truth's. Chosen on training objects, too.
+// Weight of a stand-in's difference from the copies. The stand-in was trained to match the truth, not the copies, so
+// most of that difference is no error. Chosen on training objects.
 inline constexpr double kStandInShare = 0.2;
 
-// How many of a network's copies live.
+// How many of a network's copies stay.
 struct CopyChoice {
-  std::optional<int64_t> copies =
-      std::nullopt;                // at most so many of each Gaussian; nothing: as many as cost more than `merge_cost`
-  double merge_cost = kMergeCost;  // ≥ 0
-  int64_t max_gaussians = 0;       // in all; 0: no bound
-  float invisible = 0;             // copies of less opacity go first, and 1/255 at least
+  std::optional<int64_t> copies = std::nullopt;  // at most this many per Gaussian; unset: while merges cost more than
+                                                 // `merge_cost`
+  double merge_cost = kMergeCost;                // ≥ 0
+  int64_t max_gaussians = 0;                     // in total; 0: no limit
+  float invisible = 0;                           // copies below this opacity, and at least 1/255, go first
 };
 
-// Errors (kBadArgument): more copies than a network makes (`made`), or less than one; a cost or a bound that is
-// negative.
+// Errors (kBadArgument): copies outside 1 … `made` (what the network makes); a negative cost or limit.
 Status Validate(const CopyChoice& choice, int64_t made);
 
-// Copies of `count` Gaussians: copy k of the g-th is row first + k·count + g of a cloud. With stand-ins, row
-// first + copies·count + g is one that can take the place of all copies of the g-th; otherwise it goes.
+// Layout of the copies of `count` Gaussians in a cloud: copy k of Gaussian g is row first + k·count + g. With
+// stand-ins, row first + copies·count + g may replace all copies of g, and is dropped if it does not.
 struct CopyGroups {
   int64_t count = 0;
   int64_t copies = 1;             // 1–64
   Buffer<float> pixel_sizes;      // of the closer view, world units, one for all or one per group
-  std::vector<char> single = {};  // not 0: all its copies are merged into one; one per group, empty: none
+  std::vector<char> single = {};  // one per group; not 0: merge all its copies into one. Empty: none
   int64_t first = 0;
   bool stand_ins = false;
 };
 
-// Merges copies of one Gaussian, always the pair that can be spared best (model/compact/merge_gaussians.h): until the
-// next pair would cost too much or there are no more than CopyChoice::copies. Where max_gaussians is set, it knows what
-// the merges beyond that cost as well. A stand-in takes the place of all copies that are left where that is worth it:
-// where its cost, less that of the merges before, is no more than merge_cost for each Gaussian that it saves; and
-// wherever one copy is to stay. The same bits for any number of threads.
+// Plans which copies of each Gaussian to merge, cheapest pair first (model/compact/merge_gaussians.h), until the next
+// merge costs too much and no more than CopyChoice::copies are left. With max_gaussians set it also records the costs
+// of further merges. A stand-in replaces the remaining copies if its cost, minus that of the merges done, is at most
+// merge_cost per Gaussian saved; and whenever only one copy is to stay. The same bits for any number of threads.
 class CopyPlan {
  public:
   CopyPlan(CopyGroups groups, const CopyChoice& choice, const GaussianCloud& cloud);
 
   int64_t groups() const { return groups_.count; }
-  int64_t merged() const;  // copies that go, but for one where a stand-in comes
+  int64_t merged() const;  // Gaussians saved: copies removed, minus stand-ins used
 
-  // Writes the merged copies into the rows of `cloud` that stay, and 0 into keep[row] of the others: copies that are
-  // gone, and stand-ins for which there is no need. `into`, where it is asked for, one per row: of merged groups what
-  // CopyGroup::Write says.
-  void Carry(GaussianCloud& cloud, std::vector<char>& keep, std::vector<int64_t>* into = nullptr) const;
+  // Writes merged copies to the rows of `cloud` that stay and sets keep[row] = 0 for removed copies and unused
+  // stand-ins.
+  // `into`, if not null, has one entry per row and is filled for merged groups as CopyGroup::Write does.
+  void ApplyTo(GaussianCloud& cloud, std::vector<char>& keep, std::vector<int64_t>* into = nullptr) const;
 
  private:
   friend void MergeMore(std::span<CopyPlan> plans, int64_t more,
@@ -84,12 +82,12 @@ class CopyPlan {
   CopyGroups groups_;
   float invisible_;
   Buffer<CopyGroup::Step> steps_;
-  Buffer<uint8_t> chosen_;  // steps of each group that are done
-  Buffer<uint8_t> usable_;  // whether each group's stand-in can be one; empty: there are none
+  Buffer<uint8_t> chosen_;  // number of steps to apply per group
+  Buffer<uint8_t> usable_;  // whether each group's stand-in is valid; empty without stand-ins
 };
 
-// Adds the cheapest merges that none of the plans has, `more` of them or all there are: at least one copy of each
-// Gaussian stays. Of equally cheap ones those of the first Gaussians, by row(plan, group), which is unique.
+// Adds the `more` cheapest merges not yet planned, or all there are; one copy of each Gaussian stays. Ties go to the
+// smallest row(plan, group), which must be unique.
 void MergeMore(std::span<CopyPlan> plans, int64_t more, const std::function<int64_t(size_t plan, int64_t group)>& row);
 
 }  // namespace anchorsplat

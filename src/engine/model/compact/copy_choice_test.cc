@@ -235,8 +235,8 @@ double CostOnAGrid(const GaussianCloud& cloud, int64_t copies, double less) {
   for (int64_t k = 0; k < all; ++k) {
     const double stored = Sigmoid(double{cloud.opacity_logits[static_cast<size_t>(k)]});
     const double length = std::exp(double{cloud.log_scales[static_cast<size_t>(3 * k)]}) / kClosePixel;
-    variance.push_back((length * length + 0.3) * SeenVariance(stored));
-    opacity.push_back((stored - 1.0 / 255) / SeenVariance(stored));
+    variance.push_back((length * length + 0.3) * VisibleVarianceShare(stored));
+    opacity.push_back((stored - 1.0 / 255) / VisibleVarianceShare(stored));
     mass.push_back(opacity.back() * variance.back());
     if (k < copies) mass_of_copies += mass.back();
   }
@@ -291,7 +291,7 @@ TEST(CopyChoice, AStandInCostsWhatThePictureChanges) {
       group.Load(cloud, 0, 1, 3, kClosePixel, /*colors=*/true);
       double before = 0;
       for (size_t k = 0; k < 3; ++k) {
-        const double seen = SeenVariance(Sigmoid(-1.0));
+        const double seen = VisibleVarianceShare(Sigmoid(-1.0));
         MergeGaussian g;
         const double length = (1.2 + 0.2 * double(k)), variance = (length * length + 0.3) * seen;
         g.covariance = {variance, 0, 0, variance, 0, variance};
@@ -299,7 +299,7 @@ TEST(CopyChoice, AStandInCostsWhatThePictureChanges) {
         Measure(g);
         before += g.mass;
       }
-      while (group.alive() > 1) group.Do(group.Next());
+      while (group.alive() > 1) group.Apply(group.Next());
       const double less = group.Mass() / before;
       EXPECT_LT(less, 1);
       const double cost = group.CostOfStandIn(cloud, 3), expected = CostOnAGrid(cloud, 3, less);

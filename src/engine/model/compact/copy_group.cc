@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::array<size_t, 3> kDiagonal = {0, 3, 5};  // of xx xy xz yy yz zz
-constexpr float kBlack = -0.5f / kSh0;                  // below, there is nothing to see
+constexpr float kBlack = -0.5f / kSh0;                  // coefficients below are clamped to black
 constexpr double kMostStoredOpacity = 0.99;
 
 std::array<double, 9> RotationOf(const GaussianCloud& cloud, int64_t row) {
@@ -34,8 +34,8 @@ std::array<double, 9> Relative(const std::array<double, 9>& a, const std::array<
   return out;
 }
 
-// The mean over all directions of the product of two colours, summed over red, green and blue: the harmonics are
-// orthonormal. Below black there is nothing to see.
+// Mean over all directions of the product of two colours, summed over red, green and blue. SH are orthonormal, so it is
+// an inner product of coefficients; colours below black count as black.
 double ColorProduct(const float* a, const float* b, int64_t floats) {
   float sum = 0;
   for (int64_t c = 0; c < 3; ++c) sum += std::max(a[c], kBlack) * std::max(b[c], kBlack);
@@ -76,7 +76,7 @@ MergeGaussian CopyGroup::Seen(const GaussianCloud& cloud, int64_t row, double& s
     }
   }
   stored_opacity = Sigmoid(double{cloud.opacity_logits[static_cast<size_t>(row)]});
-  const double seen = SeenVariance(stored_opacity);
+  const double seen = VisibleVarianceShare(stored_opacity);
   for (double& x : g.covariance) x *= seen;
   g.opacity = std::max(0.0, stored_opacity - kMinAlpha) / seen;
   Measure(g);
@@ -91,7 +91,7 @@ void CopyGroup::Load(const GaussianCloud& cloud, int64_t first, int64_t stride, 
   alive_ = copies;
   pixel_ = pixel;
   colors_ = colors;
-  // Modes that compensate draw the integral of the Gaussian as it is; a trace keeps flat ones from having none.
+  // Modes with compensation draw the Gaussian's integral undilated; a trace keeps flat ones from vanishing.
   dilation_ = IsCompensated(cloud.render_mode) ? 1e-3 : double{kDilation};
   frame_ = RotationOf(cloud, first);
   for (size_t c = 0; c < 3; ++c) origin_[c] = cloud.means[static_cast<size_t>(3 * first) + c];
@@ -120,7 +120,7 @@ void CopyGroup::FindCost(size_t a, size_t b) {
   const MergeGaussian &first = copies_[a].gaussian, &second = copies_[b].gaussian;
   double& cost = costs_[At(a, b)];
   cost = kInfinity;
-  // Which go without a merge.
+  // These are dropped without merging.
   if (copies_[a].stored_opacity < invisible_ || copies_[b].stored_opacity < invisible_) return;
   const auto overlaps = Overlaps(first, second);
   const MergedPair merged = MergePair(first, second, overlaps, /*for_cost=*/true);
@@ -150,11 +150,11 @@ double CopyGroup::CostOfStandIn(const GaussianCloud& cloud, int64_t row) {
       stand_in_products_[i * all + j] = stand_in_products_[j * all + i] = product;
     }
   }
-  // Where several copies absorb, each does so of less: as if all had less opacity.
+  // Where several copies have alpha, each contributes less, as if all were less opaque.
   double sum = 0;
   for (size_t k = 0; k < n; ++k) sum += loaded_[k].mass;
   const double less = Mass() / sum;
-  // Colours around the one that the copies have together, as in MergeCost().
+  // Colours relative to the copies' common mean, as in MergeCost().
   const auto with_mean = [&](size_t i) {
     double product = 0;
     for (size_t k = 0; k < n; ++k) product += loaded_[k].mass / sum * stand_in_products_[i * all + k];
@@ -177,7 +177,7 @@ double CopyGroup::CostOfStandIn(const GaussianCloud& cloud, int64_t row) {
 }
 
 CopyGroup::Step CopyGroup::Next() const {
-  // The most opaque stays, however little that is.
+  // The most opaque copy stays, however faint.
   size_t seen = copies_.size();
   for (size_t k = 0; k < copies_.size(); ++k) {
     if (!copies_[k].alive) continue;
@@ -201,20 +201,20 @@ CopyGroup::Step CopyGroup::Next() const {
   if (least < kInfinity) {
     return {static_cast<float>(least), static_cast<uint8_t>(keep), static_cast<uint8_t>(gone)};
   }
-  // What cannot be merged: the last one but the most opaque goes.
+  // Nothing can be merged: drops the last copy that is not the most opaque.
   for (size_t k = copies_.size(); k-- > 0;) {
     if (copies_[k].alive && k != seen) gone = k;
   }
   return {std::numeric_limits<float>::infinity(), static_cast<uint8_t>(gone), static_cast<uint8_t>(gone)};
 }
 
-void CopyGroup::Do(const Step& step) {
+void CopyGroup::Apply(const Step& step) {
   Copy &keep = copies_[step.keep], &gone = copies_[step.gone];
   gone.alive = false;
   --alive_;
   if (step.keep == step.gone) return;
   const MergedPair merged = MergePair(keep.gaussian, gone.gaussian, Overlaps(keep.gaussian, gone.gaussian));
-  if (!merged.valid) return;  // as if it had been invisible
+  if (!merged.valid) return;  // then `gone` counts as invisible
   keep.gaussian = merged.gaussian;
   keep.stored_opacity = std::max(keep.stored_opacity, gone.stored_opacity);
   keep.merged = true;
@@ -238,18 +238,18 @@ void CopyGroup::Do(const Step& step) {
 
 bool CopyGroup::WriteMerged(const Copy& copy, const double* weights, int64_t row, GaussianCloud& cloud) const {
   const MergeGaussian& g = copy.gaussian;
-  // The Gaussian that has this part to be seen.
+  // Finds the opacity of the Gaussian with this visible part.
   double low = kMinAlpha, high = 1;
   for (int i = 0; i < 16; ++i) {
     const double opacity = std::sqrt(low * high);
-    ((opacity - kMinAlpha) / SeenVariance(opacity) < g.opacity ? low : high) = opacity;
+    ((opacity - kMinAlpha) / VisibleVarianceShare(opacity) < g.opacity ? low : high) = opacity;
   }
-  const double seen = SeenVariance(high);
+  const double seen = VisibleVarianceShare(high);
   std::array<double, 6> covariance = g.covariance;
   for (double& x : covariance) x /= seen;
   for (const size_t diagonal : kDiagonal) covariance[diagonal] -= dilation_;
   Ellipsoid ellipsoid = EllipsoidOf(covariance);
-  // Nothing is thinner than the dilation: what has become longer by that absorbs less.
+  // No visible width is below the dilation: an axis that had to be lengthened lowers the opacity.
   MergeGaussian drawn;
   for (size_t c = 0; c < 3; ++c) {
     ellipsoid.variances[c] = std::max(ellipsoid.variances[c], g.thinnest);
@@ -291,7 +291,7 @@ void CopyGroup::Write(GaussianCloud& cloud, std::vector<char>& keep, std::vector
   for (size_t k = 0; k < copies_.size(); ++k) {
     const int64_t row = first_ + static_cast<int64_t>(k) * stride_;
     if (into != nullptr && copies_[k].alive) {
-      // What a copy's colour is made of are those that it took in.
+      // A copy's colour is the weighted mean of those merged into it.
       for (size_t from = 0; from < copies_.size(); ++from) {
         if (weights_[At(k, from)] != 0)
           (*into)[static_cast<size_t>(first_ + static_cast<int64_t>(from) * stride_)] = row;
@@ -300,7 +300,7 @@ void CopyGroup::Write(GaussianCloud& cloud, std::vector<char>& keep, std::vector
     if (!copies_[k].alive) {
       keep[static_cast<size_t>(row)] = 0;
     } else if (copies_[k].merged) {
-      // No Gaussian that floats hold: it stays as its first copy was.
+      // Does not fit in float: the first copy stays as it was.
       (void)WriteMerged(copies_[k], weights_.data() + At(k, 0), row, cloud);
     }
   }

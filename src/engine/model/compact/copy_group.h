@@ -9,32 +9,32 @@
 
 namespace anchorsplat {
 
-// The copies of one Gaussian on their way to fewer. One object serves one group after the other.
+// Merges the copies of one Gaussian step by step. Reusable: Load starts the next group.
 class CopyGroup {
  public:
-  // `most`: copies of a group. `invisible`: opacity below which nobody sees a copy.
+  // `most`: maximum copies per group. `invisible`: opacity below which a copy cannot be seen.
   CopyGroup(int64_t most, float invisible);
 
-  // Rows first, first + stride, … of the cloud. `pixel`: of the closer view, world units. `colors`: whether costs will
-  // be asked for.
+  // Loads rows first, first + stride, … of the cloud. `pixel`: closer-view pixel size, world units. `colors`: whether
+  // costs are needed.
   void Load(const GaussianCloud& cloud, int64_t first, int64_t stride, int64_t copies, double pixel, bool colors);
 
   struct Step {
     float cost = 0;              // ≥ 0, or infinite
-    uint8_t keep = 0, gone = 0;  // copies; the same one: it goes and leaves no trace
+    uint8_t keep = 0, gone = 0;  // copies to merge; if equal, the copy is dropped
   };
   int64_t alive() const { return alive_; }
-  double Mass() const;  // of what is left, as MergeGaussian::mass
-  // What to do next, for alive() > 1: the invisible first, then the cheapest pair.
+  double Mass() const;  // of the remaining copies, as MergeGaussian::mass
+  // The next step, for alive() > 1: drops invisible copies first, then merges the cheapest pair.
   Step Next() const;
-  void Do(const Step& step);
+  void Apply(const Step& step);
 
-  // What it costs of the picture of the loaded copies to show row `row` of the cloud instead, as the cost of a step;
-  // not finite: there is no telling. Of a group that was loaded with colours and has been merged into one.
+  // Cost of showing row `row` of the cloud instead of the loaded copies, comparable to Step::cost; not finite if it
+  // cannot be computed. Requires a group loaded with colours and merged into one.
   double CostOfStandIn(const GaussianCloud& cloud, int64_t row);
 
-  // Writes the merged copies into the rows of those that stay, and 0 into keep[row] of the others. `into`, where it is
-  // asked for: for each row the one that it is a part of now, or -1 where it left no trace.
+  // Writes merged copies to the rows that stay and sets keep[row] = 0 for the others. `into`, if not null: for each row
+  // the row it was merged into, or −1 if it was dropped.
   void Write(GaussianCloud& cloud, std::vector<char>& keep, std::vector<int64_t>* into = nullptr) const;
 
  private:
@@ -46,7 +46,7 @@ class CopyGroup {
   };
   size_t At(size_t a, size_t b) const { return a * copies_.size() + b; }
   void FindCost(size_t a, size_t b);  // a < b
-  // A row as it is seen in the frame.
+  // A row of the cloud in the local frame.
   MergeGaussian Seen(const GaussianCloud& cloud, int64_t row, double& stored_opacity) const;
   bool WriteMerged(const Copy& copy, const double* weights, int64_t row, GaussianCloud& cloud) const;
 
@@ -58,9 +58,9 @@ class CopyGroup {
   std::array<double, 9> frame_{};  // columns: the axes
   std::vector<Copy> copies_;
   std::vector<double> color_products_, weights_;  // [K,K]; weights: of the loaded colours in each copy's
-  std::vector<double> costs_;                     // [K,K], of a < b
-  std::vector<MergeGaussian> loaded_;             // as the copies were, then the stand-in
-  std::vector<double> stand_in_products_;         // [K+1,K+1], of their colours
+  std::vector<double> costs_;                     // [K,K], of pairs a < b
+  std::vector<MergeGaussian> loaded_;             // the copies as loaded, then the stand-in
+  std::vector<double> stand_in_products_;         // [K+1,K+1] colour products of `loaded_`
 };
 
 }  // namespace anchorsplat

@@ -13,7 +13,7 @@ namespace {
 using Vector = std::array<double, 3>;
 using Symmetric = std::array<double, 6>;  // xx xy xz yy yz zz
 
-// A view along an axis of the frame: the two others, and where their covariance stands.
+// A view along an axis of the frame: the other two axes, and the indices of their covariance.
 struct View {
   size_t u, v, uu, uv, vv;
 };
@@ -43,7 +43,7 @@ Symmetric Inverse(const Symmetric& s) {
           (s[0] * s[3] - s[1] * s[1]) * inverse};
 }
 
-// The Gaussian that two Gaussians' product is, but for a factor.
+// Two Gaussians' product as a Gaussian, up to a factor.
 struct Product {
   Vector mean;
   Symmetric covariance;
@@ -80,15 +80,15 @@ bool IsPositive(const Symmetric& s) {
 
 }  // namespace
 
-double SeenVariance(double opacity) {
+double VisibleVarianceShare(double opacity) {
   const double rest = std::min(kMinAlpha / opacity, 0.95);
   return (1 - rest + rest * std::log(rest)) / (1 - rest);
 }
 
 void Measure(MergeGaussian& gaussian) {
-  // From direction n it is 2π·√(nᵀ adj(Σ) n). The mean of what is under the root is the trace of adj(Σ) over 3; the
-  // mean of the root itself is less by up to an eighth, for discs: 0.866, 0.962 for needles and 1 for balls, which a
-  // line over tr(adj²)/tr(adj)² meets.
+  // From direction n it is 2π·√(nᵀ adj(Σ) n). The radicand's mean is tr(adj(Σ))/3; the root's mean is up to an eighth
+  // less than the root of that: factor 0.866 for discs, 0.962 for needles, 1 for balls. A line over tr(adj²)/tr(adj)²
+  // fits these three.
   const Symmetric& s = gaussian.covariance;
   std::array<double, 3> squares;
   double trace = 0;
@@ -149,7 +149,7 @@ MergedPair MergePair(const MergeGaussian& a, const MergeGaussian& b, const std::
   merged.valid = std::isfinite(sum.mass) && std::isfinite(sum.mean[0] + sum.mean[1] + sum.mean[2]);
   if (for_cost || !merged.valid) return merged;
   moments(twice, out);
-  if (!IsPositive(out.covariance)) moments(0, out);  // Gaussians that cross at an angle
+  if (!IsPositive(out.covariance)) moments(0, out);  // for Gaussians that cross at an angle
   merged.valid = IsPositive(out.covariance);
   if (!merged.valid) return merged;
   out.thinnest = std::min(a.thinnest, b.thinnest);
@@ -168,14 +168,14 @@ double MergeCost(const MergeGaussian& a, const MergeGaussian& b, const std::arra
                  const MergedPair& merged, const MergeColors& colors) {
   const MergeGaussian& m = merged.sum;
   const std::array<double, 3> with_a = Overlaps(a, m), with_b = Overlaps(b, m);
-  // Around the colour that they have together.
+  // Colours relative to their common mean.
   const double s = merged.share, t = 1 - s;
   const double ma = s * colors.aa + t * colors.ab, mb = s * colors.ab + t * colors.bb, mm = s * ma + t * mb;
   constexpr double kAlpha = 3 * kBehind * kBehind;
   const double aa = colors.aa - 2 * ma + mm + kAlpha, bb = colors.bb - 2 * mb + mm + kAlpha;
   const double ab = colors.ab - ma - mb + mm + kAlpha;
-  // The merged one's own colour is the centre: only alpha is left of it.
-  // Where both absorb, each does so of less: as if both had less opacity.
+  // The merged one has the mean colour, so only its alpha term remains.
+  // Where both have alpha, each contributes less, as if both were less opaque.
   const double less = m.mass / (a.mass + b.mass), oa = less * a.opacity, ob = less * b.opacity, om = m.opacity;
   double cost = 0;
   for (size_t w = 0; w < 3; ++w) {

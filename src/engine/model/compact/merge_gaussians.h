@@ -5,59 +5,60 @@
 
 namespace anchorsplat {
 
-// Two Gaussians as one, and what that costs of the picture. All in a frame of three axes (the directions that they are
-// looked at from) whose unit is a pixel of the closer view, with the rasterizer's dilation for that view added.
+// Merges two Gaussians into one and measures the error in the picture. Coordinates: a frame whose three axes are the
+// view directions, in closer-view pixels, with the rasterizer's dilation for that view included.
 //
-// What is seen of a Gaussian ends where it absorbs less than 1/255. Copies are faint: at an opacity of 0.02 that is a
-// fifth of the mass. So here a Gaussian stands for what is seen of it: it has that one's mass and variance, see
-// SeenVariance(). Merging those as they are stored makes a dense splat too opaque, and costs a decibel.
+// A Gaussian is invisible where its alpha is below 1/255. Copies are faint: at opacity 0.02 that is a fifth of the
+// mass.
+// So MergeGaussian has the mass and variance of the visible part only (VisibleVarianceShare). Merging Gaussians as
+// stored would make dense splats too opaque, which costs 1 dB.
 //
-// Together, two Gaussians absorb α_a + α_b − α_a·α_b. The one that takes their place has that function's mass, mean and
-// covariance. Its opacity says how much of it is seen in the three views; where that is more than a Gaussian can have,
-// it becomes wider.
+// Two Gaussians together have alpha α_a + α_b − α_a·α_b. The merged one has that function's mass, mean and covariance.
+// Its opacity follows from its mass in the three views; if that exceeds the maximum opacity, it is widened instead. it
+// becomes wider.
 struct MergeGaussian {
   std::array<double, 3> mean{};
   std::array<double, 6> covariance{};  // xx xy xz yy yz zz, > 0
   double opacity = 0;                  // 0–1
-  double thinnest = 0;                 // the least variance of a Gaussian in it, without dilation
+  double thinnest = 0;                 // smallest variance of a Gaussian merged into it, without dilation
 
-  // What follows of these, see Measure().
-  std::array<double, 3> area{};  // ∫ of the Gaussian itself per view, pixels
-  double mean_area = 0;          // the same, mean over all directions, about
-  double mass = 0;               // opacity times mean_area
+  // Derived by Measure().
+  std::array<double, 3> area{};  // ∫ of the unit-opacity Gaussian per view, pixels²
+  double mean_area = 0;          // approximate mean of the same over all directions
+  double mass = 0;               // opacity · mean_area
 };
 
-// The variance of the part of a Gaussian where it absorbs 1/255 and more, as a share of its own. With r = 1/(255·o):
-// (1 − r + r·ln r) / (1 − r); the part's mass is the share 1 − r.
-double SeenVariance(double opacity);
+// Variance of a Gaussian's visible part (alpha ≥ 1/255) relative to the whole: (1 − r + r·ln r) / (1 − r) with r =
+// 1/(255·o). The visible part's mass is the fraction 1 − r.
+double VisibleVarianceShare(double opacity);
 
-// The most that a merged Gaussian absorbs, in terms of what is seen of it.
+// Maximum opacity of a merged Gaussian, of its visible part.
 inline constexpr double kMostMergedOpacity = 1;
 
-// Fills `area`, `mean_area` and `mass`.
+// Computes `area`, `mean_area` and `mass`.
 void Measure(MergeGaussian& gaussian);
 
-// What of the pair is needed more than once: ∫ g_a·g_b per view.
+// ∫ g_a·g_b per view, which several functions need.
 std::array<double, 3> Overlaps(const MergeGaussian& a, const MergeGaussian& b);
 
 struct MergedPair {
   MergeGaussian gaussian;
-  MergeGaussian sum;   // the same of α_a + α_b, with the mass of `gaussian`: what costs are taken from
-  double share = 0.5;  // of a's colour; b's is the rest
-  bool valid = false;  // false: there is no finite Gaussian with these moments, or nothing that could be seen
+  MergeGaussian sum;   // the same for α_a + α_b, with the mass of `gaussian`; costs refer to it
+  double share = 0.5;  // weight of a's colour; b's is 1 − share
+  bool valid = false;  // false: no finite Gaussian has these moments, or nothing would be visible
 };
-// `for_cost`: `gaussian` stays as it is, which is quicker.
+// `for_cost`: computes only `sum` and `share`, for speed.
 MergedPair MergePair(const MergeGaussian& a, const MergeGaussian& b, const std::array<double, 3>& overlaps,
                      bool for_cost = false);
 
-// Colours as inner products: the mean over all directions of products of the colours, summed over red, green and blue.
+// Inner products of two colours: mean over all directions of their product, summed over red, green and blue.
 struct MergeColors {
   double aa = 0, ab = 0, bb = 0;
 };
 
-// How different the pair and the merged one look: ∫ of the squared difference of their colours times alpha over the
-// picture, in pixels, mean over the three views and over red, green and blue. What stands behind them is taken for as
-// bright as they are, give or take kBehind: the difference in colour counts in full, one of alpha that much.
+// Cost of a merge: ∫ of the squared difference of colour × alpha over the picture, in pixels, averaged over the three
+// views and over red, green and blue. The background is assumed as bright as the Gaussians ± kBehind: colour
+// differences count fully, alpha differences with that weight.
 inline constexpr double kBehind = 0.2;
 double MergeCost(const MergeGaussian& a, const MergeGaussian& b, const std::array<double, 3>& overlaps,
                  const MergedPair& merged, const MergeColors& colors);

@@ -113,10 +113,10 @@ TEST(MergeGaussians, WhatIsSeenOfAGaussianIsItsBrightPart) {
       mass += alpha * r;
       square += alpha * r * r * r / 2;  // of one of two axes
     }
-    EXPECT_NEAR(SeenVariance(opacity), square / mass, 2e-3) << opacity;
+    EXPECT_NEAR(VisibleVarianceShare(opacity), square / mass, 2e-3) << opacity;
     EXPECT_NEAR(mass * 0.001, opacity - 1.0 / 255, 1e-4) << opacity;
   }
-  EXPECT_GT(SeenVariance(0), 0);
+  EXPECT_GT(VisibleVarianceShare(0), 0);
 }
 
 // Against the mean over directions of the plane's area.

@@ -10,7 +10,7 @@
 
 namespace anchorsplat {
 
-// Flat Gaussians all over a wavy sheet about 100 pixels of size 0.01 wide, as fits make of surfaces.
+// Flat Gaussians on a wavy sheet about 100 pixels of size 0.01 wide, like a fitted surface.
 inline GaussianCloud SheetCloud(int64_t n, int sh_degree = 3, uint64_t seed = 1) {
   GaussianCloud cloud;
   cloud.Resize(n, sh_degree);
@@ -41,7 +41,7 @@ inline GaussianCloud SheetCloud(int64_t n, int sh_degree = 3, uint64_t seed = 1)
 }
 inline constexpr float kSheetPixel = 0.01f;
 
-// Made-up weights of a network that finds everything within its training data.
+// Wraps weights so that every Gaussian is within the training data.
 inline WeightSource OpenDomain(WeightSource source = HashWeights()) {
   return [source = std::move(source)](const TensorSpec& tensor, std::span<float> values) -> Status {
     if (!tensor.name.starts_with("domain.")) return source(tensor, values);

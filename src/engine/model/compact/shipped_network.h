@@ -8,22 +8,21 @@
 
 namespace anchorsplat {
 
-// The compact networks that are part of the program itself, of the folder models/ of the source tree when the program
-// was built (docs/network.md): anchorsplat-compact.safetensors for splats like standard fits,
-// anchorsplat-classic.safetensors for all other classic ones, anchorsplat-single.safetensors for classic ones of which
-// one Gaussian is to become one, and anchorsplat-antialiased.safetensors for those whose render mode makes up for the
-// dilation (IsCompensated). There are all or none.
+// The networks built into the program from models/ of the source tree (docs/network.md). A build has all or none.
+//   kStandard     anchorsplat-compact.safetensors      splats like standard fits
+//   kClassic      anchorsplat-classic.safetensors      other classic splats
+//   kSingle       anchorsplat-single.safetensors       classic splats, one Gaussian per Gaussian
+//   kAntialiased  anchorsplat-antialiased.safetensors  render modes that compensate the dilation (IsCompensated)
 enum class Shipped { kStandard, kClassic, kSingle, kAntialiased };
 inline constexpr Shipped kAllShipped[] = {Shipped::kStandard, Shipped::kClassic, Shipped::kSingle,
                                           Shipped::kAntialiased};
 
 bool HasShippedNetwork();
 
-// Tells the shipped networks of one program from those of another: sizes and a hash of their bytes. Empty when there
-// are none.
+// Identifies the built-in networks: their sizes and a hash of their bytes. Empty without networks.
 std::string ShippedNetworkIdentity();
 
-// Errors: kNotFound when there is none; those of LoadCompactNetwork.
+// Errors: kNotFound in a build without networks; those of LoadCompactNetwork.
 Result<CompactNetwork> LoadShippedNetwork(Shipped which = Shipped::kStandard);
 
 }  // namespace anchorsplat

@@ -22,11 +22,11 @@
 #define ANCHORSPLAT_ATTENTION_ONCE
 namespace anchorsplat {
 
-// Reused by the tasks of a thread.
+// Reused across tasks of a thread.
 struct AttentionScratch {
   Buffer<float> keys;           // [keys, depth], padded with zeros to whole tiles
   Buffer<float> values;         // [keys, depth]
-  Buffer<float> queries;        // [depth][group] of the queries at hand, scaled
+  Buffer<float> queries;        // [depth][group] of the current queries, scaled
   Buffer<float> probabilities;  // [keys of a block][group], not normalised
   Buffer<float> sums;           // [depth][group] Σ probability · value
 };
@@ -38,12 +38,12 @@ HWY_BEFORE_NAMESPACE();
 namespace anchorsplat {
 namespace HWY_NAMESPACE {
 
-// Queries stand in the lanes: the softmax of a query is then a matter of its lane, and keys and values are broadcast.
+// Queries occupy the lanes: each softmax stays within its lane, and keys and values are broadcast.
 using GroupTag = hn::CappedTag<float, 16>;
 #if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL
 inline constexpr int kVectors = 4;  // of queries, a group
 inline constexpr int kKeyTile = 6;  // keys whose scores are in registers at once
-inline constexpr int kDimTile = 4;  // channels of the output whose sums are
+inline constexpr int kDimTile = 4;  // output channels whose sums are in registers at once
 #elif HWY_TARGET == HWY_NEON
 inline constexpr int kVectors = 4;
 inline constexpr int kKeyTile = 6;
@@ -56,11 +56,11 @@ inline constexpr int kDimTile = 4;
 inline constexpr int kLanes = static_cast<int>(HWY_MIN(HWY_LANES(float), size_t{16}));
 inline constexpr int kGroup = kVectors * kLanes;
 static_assert(kLargestGroup % kGroup == 0);
-inline constexpr int64_t kKeyBlock = 10 * kKeyTile;  // its probabilities stay in the first cache
+inline constexpr int64_t kKeyBlock = 10 * kKeyTile;  // its probabilities stay in the L1 cache
 
 using V = hn::VFromD<GroupTag>;
 
-// Scores of kKeyTile keys and a group of queries, minus `shift`.
+// Scores of kKeyTile keys for a group of queries, minus `shift`.
 HWY_INLINE void Scores(const float* HWY_RESTRICT keys, const float* HWY_RESTRICT queries, int64_t depth,
                        const V (&shift)[kVectors], V (&scores)[kKeyTile][kVectors]) {
   const GroupTag d;
@@ -82,8 +82,7 @@ HWY_INLINE void Scores(const float* HWY_RESTRICT keys, const float* HWY_RESTRICT
   }
 }
 
-// The largest score of each query, looking at every `step`-th tile of keys. NaN may get lost here, but not in the
-// probabilities.
+// The largest score of each query over every `step`-th tile of keys. May miss NaN; the probabilities do not.
 HWY_NOINLINE void LargestScores(const float* keys, int64_t key_count, int64_t step, const float* queries, int64_t depth,
                                 float* HWY_RESTRICT largest) {
   const GroupTag d;
@@ -108,7 +107,7 @@ HWY_NOINLINE void LargestScores(const float* keys, int64_t key_count, int64_t st
   for (int v = 0; v < kVectors; ++v) hn::StoreU(best[v], d, largest + v * kLanes);
 }
 
-// Probabilities exp2(score − shift) of a block of keys, and their sums over the keys added to `total`.
+// Probabilities exp2(score − shift) of a block of keys; adds their sums over the keys to `total`.
 template <ScoreRange kRange, Rounding kRounding>
 HWY_NOINLINE void Probabilities(const float* keys, int64_t key_count, const float* queries, int64_t depth,
                                 const float* HWY_RESTRICT shifts, float* HWY_RESTRICT probabilities,
@@ -179,7 +178,7 @@ void RoundAndScale(float* values, int64_t count, float factor) {
   }
 }
 
-// The sum of squares of a key; `depth` is a multiple of four, whose sums do not wait for each other.
+// Sum of squares of a key; `depth` is a multiple of four, summed in independent chains.
 float Squares(const float* key, int64_t depth) {
   static_assert(kDimTile % 4 == 0);
   float sums[4] = {};
@@ -196,7 +195,7 @@ void AttendGroup(const AttentionParams& p, const AttentionTask& task, int64_t de
   const int64_t width = p.channels / p.heads;
   const int64_t count = std::min<int64_t>(kGroup, task.last - query);
   const int32_t* rows = p.patch_rows + task.patch_begin + query;
-  // Scores are wanted as exponents of 2.
+  // Scores become exponents of 2.
   const float scale = p.scale * 1.44269504088896341f;
   std::fill(s.queries.begin(), s.queries.end(), 0.0f);
   for (int64_t i = 0; i < count; ++i) {
@@ -314,8 +313,8 @@ void AttentionCpu(const AttentionParams& p) {
   const int64_t padded = PaddedCount(p.count, p.patch_size);
   const int64_t patch = std::min(padded, p.patch_size);
   const int64_t patches = padded / patch;
-  // Whole patches are cheapest; they are split (at multiples of every group, so that no bit changes) when that leaves
-  // threads without work.
+  // Whole patches are cheapest. They are split (at multiples of every group, so results do not change) only if threads
+  // would otherwise be idle.
   const auto whole_groups = [](int64_t n) { return (n + kLargestGroup - 1) / kLargestGroup * kLargestGroup; };
   int64_t chunk = whole_groups(patch);
   const int64_t wanted = 4 * static_cast<int64_t>(ThreadCount());
@@ -325,7 +324,7 @@ void AttentionCpu(const AttentionParams& p) {
     auto& scratch = PerThread<AttentionScratch>();
     for (int64_t index = begin; index < end; ++index) {
       const int64_t slot = index / (p.heads * chunks) * patch;
-      const int64_t own = std::min(patch, p.count - slot);  // the rest of a last patch is borrowed
+      const int64_t own = std::min(patch, p.count - slot);  // a last patch borrows the rest
       const int64_t first = index % chunks * chunk;
       if (first >= own) continue;
       const AttentionTask task = {.patch_begin = slot,

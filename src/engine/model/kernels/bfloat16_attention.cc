@@ -2,7 +2,7 @@
 
 #if defined(__x86_64__)
 
-// GCC 12 takes the undefined vectors that its own intrinsics pass for lanes nobody reads for a mistake (bug 105593).
+// GCC 12 warns about uninitialized vectors that its own intrinsics pass for unused lanes (bug 105593).
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
 #endif
@@ -27,25 +27,25 @@ namespace anchorsplat {
 
 namespace {
 
-// Queries stand in the lanes, as in attention.cc.
+// Queries occupy the lanes, as in attention.cc.
 constexpr int kLanes = 16;
 constexpr int kVectors = 4;  // of queries, a group
 constexpr int kGroup = kVectors * kLanes;
 constexpr int kKeyTile = 6;                   // keys whose scores are in registers at once; even, for pairs
-constexpr int kDimTile = 4;                   // channels of the output whose sums are
-constexpr int64_t kKeyBlock = 20 * kKeyTile;  // its probabilities stay in the first cache
+constexpr int kDimTile = 4;                   // output channels whose sums are in registers at once
+constexpr int64_t kKeyBlock = 20 * kKeyTile;  // its probabilities stay in the L1 cache
 static_assert(kLargestGroup % kGroup == 0);
 
-// Reused by the tasks of a thread.
+// Reused across tasks of a thread.
 struct Scratch {
   Buffer<BFloat16Pair> keys;           // [keys, pairs of channels], padded with zeros to whole tiles
   Buffer<BFloat16Pair> values;         // [pairs of keys, channels], padded with zeros
-  Buffer<BFloat16Pair> queries;        // [pairs of channels][group] of the queries at hand
+  Buffer<BFloat16Pair> queries;        // [pairs of channels][group] of the current queries
   Buffer<BFloat16Pair> probabilities;  // [pairs of keys of a block][group], not normalised
   Buffer<float> sums;                  // [channels][group] Σ probability · value
 };
 
-// The scores of a group of queries as exponents of 2 and what they need.
+// Scores of a group of queries as exponents of 2, with shifts and totals.
 struct Group {
   const BFloat16Pair* queries;
   int64_t pairs;  // of channels
@@ -59,13 +59,13 @@ ANCHORSPLAT_BF16_INLINE __m512bh Broadcast(BFloat16Pair p) {
   return (__m512bh)_mm512_set1_epi32(static_cast<int32_t>(p));
 }
 
-// The first `count` of 16 floats, zeros after them.
+// Loads the first `count` of 16 floats, zeros for the rest.
 ANCHORSPLAT_BF16_INLINE __m512 LoadFirst(const float* values, int64_t count) {
   const auto mask = static_cast<__mmask16>(count >= kLanes ? 0xffffu : (1u << count) - 1);
   return _mm512_maskz_loadu_ps(mask, values);
 }
 
-// Products of kKeyTile keys and a group of queries.
+// Products of kKeyTile keys with a group of queries.
 ANCHORSPLAT_BF16_INLINE void Products(const BFloat16Pair* keys, const BFloat16Pair* queries, int64_t pairs,
                                       __m512 (&products)[kKeyTile][kVectors]) {
   ANCHORSPLAT_UNROLL
@@ -86,8 +86,7 @@ ANCHORSPLAT_BF16_INLINE void Products(const BFloat16Pair* keys, const BFloat16Pa
   }
 }
 
-// The largest score of each query, looking at every `step`-th tile of keys. NaN may get lost here, but not in the
-// probabilities.
+// The largest score of each query over every `step`-th tile of keys. May miss NaN; the probabilities do not.
 ANCHORSPLAT_BF16_NOINLINE void LargestScores(const BFloat16Pair* keys, int64_t key_count, int64_t step, Group& g) {
   __m512 best[kVectors];
   const __m512 scale = _mm512_set1_ps(g.scale);
@@ -107,12 +106,12 @@ ANCHORSPLAT_BF16_NOINLINE void LargestScores(const BFloat16Pair* keys, int64_t k
   for (int v = 0; v < kVectors; ++v) _mm512_storeu_ps(g.shifts + v * kLanes, best[v]);
 }
 
-// 2^x whose upper half is the nearest bfloat16, ties up; the lower half means nothing. 2^f for f = x − ⌊x⌋ by the
-// minimax polynomial of degree 3 (Remez, relative weight, error 7.5e-5) lies in [1, 2], where half a unit of a bfloat16
-// is 2^-8: with that in its constant term, cutting off is rounding.
+// 2^x with the upper half rounded to the nearest bfloat16, ties up; the lower half is meaningless. 2^f for f = x − ⌊x⌋
+// is the minimax polynomial of degree 3 (Remez, relative weight, error 7.5e-5) and lies in [1, 2], where half a
+// bfloat16 unit is 2^-8. Its constant term includes that, so truncation rounds.
 template <ScoreRange kRange>
 ANCHORSPLAT_BF16_INLINE __m512 Exp2ToCut(__m512 x) {
-  constexpr int kFloor = 0x09;  // to whole numbers, downwards, no exceptions
+  constexpr int kFloor = 0x09;  // round down, suppress exceptions
   const __m512 f = _mm512_reduce_ps(x, kFloor);
   __m512 p = _mm512_set1_ps(0.07802452264047964f);
   p = _mm512_fmadd_ps(p, f, _mm512_set1_ps(0.22606715542748304f));
@@ -185,7 +184,7 @@ ANCHORSPLAT_BF16_NOINLINE void Accumulate(const BFloat16Pair* __restrict probabi
   }
 }
 
-// A row of `width` floats as `pairs` pairs, `stride` apart. Returns its sum of squares before rounding.
+// Packs a row of `width` floats into `pairs` pairs, `stride` apart. Returns its sum of squares before rounding.
 ANCHORSPLAT_BF16_INLINE float PackChannels(const float* row, int64_t width, int64_t pairs, int64_t stride,
                                            BFloat16Pair* out) {
   __m512 squares = _mm512_setzero_ps();
@@ -200,7 +199,7 @@ ANCHORSPLAT_BF16_INLINE float PackChannels(const float* row, int64_t width, int6
   return _mm512_reduce_add_ps(squares);
 }
 
-// Two rows as pairs of a channel of each.
+// Packs two rows as one pair per channel.
 ANCHORSPLAT_BF16_INLINE void PackRows(const float* first, const float* second, int64_t width, BFloat16Pair* out) {
   for (int64_t c = 0; c < width; c += kLanes) {
     const __m256i a = (__m256i)_mm512_cvtneps_pbh(LoadFirst(first + c, width - c));
@@ -211,7 +210,7 @@ ANCHORSPLAT_BF16_INLINE void PackRows(const float* first, const float* second, i
   }
 }
 
-// Keys and values of the patch; returns the length of the longest key, or NaN.
+// Packs a patch's keys and values. Returns the length of the longest key, or NaN.
 ANCHORSPLAT_BF16_NOINLINE float PackPatch(const AttentionParams& p, const AttentionTask& task, int64_t pairs,
                                           int64_t depth, Scratch& s) {
   const int64_t width = p.channels / p.heads;
@@ -236,7 +235,7 @@ ANCHORSPLAT_BF16_NOINLINE float PackPatch(const AttentionParams& p, const Attent
   return ordered ? std::sqrt(longest) : std::numeric_limits<float>::quiet_NaN();
 }
 
-// Writes the means of a group of `count` queries, rounded.
+// Writes the outputs of a group of `count` queries, rounded.
 ANCHORSPLAT_BF16_NOINLINE void WriteMeans(const AttentionParams& p, const AttentionTask& task, const int32_t* rows,
                                           int64_t count, const float* totals, float* sums) {
   const int64_t width = p.channels / p.heads;
@@ -263,7 +262,7 @@ ANCHORSPLAT_BF16_NOINLINE void AttendGroup(const AttentionParams& p, const Atten
   Group g{
       .queries = s.queries.data(), .pairs = pairs, .scale = p.scale * 1.44269504088896341f, .shifts = {}, .totals = {}};
   std::fill(s.queries.begin(), s.queries.end(), 0);
-  // Rounding to bfloat16 makes the bounds 0.8 % too small at most, which ChooseShifts leaves room for.
+  // Rounding to bfloat16 makes the bounds at most 0.8 % too small; ChooseShifts has room for that.
   float bounds[kGroup] = {};
   for (int64_t i = 0; i < count; ++i) {
     const float* q = p.qkv + int64_t{3} * rows[i] * p.channels + task.head * width;

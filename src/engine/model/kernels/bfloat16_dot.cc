@@ -24,7 +24,7 @@ ANCHORSPLAT_BF16 __attribute__((noinline)) void MultiplyDot(const Tile<BFloat16P
     for (int r = 0; r < kRows; ++r) sums[r][v] = bias;
   }
   if (t.added != nullptr) {
-    // They are wanted when the products are done: by then they have come nearer.
+    // Needed after the products; prefetched now.
     ANCHORSPLAT_UNROLL
     for (int r = 0; r < kRows; ++r) {
       ANCHORSPLAT_UNROLL

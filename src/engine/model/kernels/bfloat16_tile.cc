@@ -111,7 +111,7 @@ HWY_EXPORT(WidenedRows);
 HWY_EXPORT(RoundToPairs);
 
 bool UsesBFloat16Dot() {
-  // Tests that ask for a narrow SIMD target shall not get the widest instructions there are.
+  // So that tests of a narrow SIMD target do not get wider instructions.
   return (hwy::SupportedTargets() & HWY_AVX3) != 0 && HasBFloat16Dot();
 }
 

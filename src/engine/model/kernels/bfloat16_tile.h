@@ -6,18 +6,18 @@
 
 namespace anchorsplat {
 
-// Tiles of products of bfloat16 pairs with sums in fp32, in the best way this processor has: by its own dot products
-// (AVX512_BF16), or by widening to floats. The former flushes subnormals and rounds between the two products of a pair
-// differently, so the last bits depend on the machine.
+// Matrix tiles of bfloat16 pairs with fp32 sums, by the fastest means of this processor: AVX512_BF16 dot products, or
+// widening to floats. Dot products flush subnormals and round between a pair's two products differently, so the last
+// bits depend on the machine.
 struct BFloat16Product {
-  int64_t rows;     // at most this many rows per tile
-  int64_t columns;  // and columns, a multiple of PackedWeights::kPanel
+  int64_t rows;     // maximum rows per tile
+  int64_t columns;  // maximum columns per tile, a multiple of PackedWeights::kPanel
   void (*multiply)(int64_t rows, int64_t columns, const Tile<BFloat16Pair>& tile);
 };
 BFloat16Product ChooseBFloat16Product();
-bool UsesBFloat16Dot();  // whether it is the former
+bool UsesBFloat16Dot();  // whether ChooseBFloat16Product picks dot products
 
-// `count` floats as (count + 1) / 2 pairs, each rounded to nearest even; NaN stays NaN.
+// Rounds `count` floats to nearest even, as (count + 1) / 2 pairs; NaN stays NaN.
 void RoundToPairs(const float* values, int64_t count, BFloat16Pair* pairs);
 
 }  // namespace anchorsplat

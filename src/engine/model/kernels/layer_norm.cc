@@ -28,7 +28,7 @@ void NormalizeRows(const LayerNormParams& p, int64_t begin, int64_t end) {
     for (int64_t c = 0; c < whole; c += lanes) sums = hn::Add(sums, hn::LoadU(d, x + c));
     for (int64_t c = whole; c < channels; ++c) sum += x[c];
     const float mean = (hn::GetLane(hn::SumOfLanes(d, sums)) + sum) * inverse;
-    // Two passes over a row in the first cache: the difference of squares would cancel.
+    // Two passes over a row in the L1 cache: a difference of squares would cancel.
     const auto means = hn::Set(d, mean);
     auto squares = hn::Zero(d);
     float square = 0;

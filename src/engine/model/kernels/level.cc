@@ -14,8 +14,7 @@ namespace {
 using Codes = std::array<Buffer<int64_t>, kCurves>;
 using Orders = std::array<Buffer<int32_t>, kCurves>;
 
-// Orders, patches and neighbours of a level whose voxels, depth and (unshuffled) codes are known. Gives back the
-// orders.
+// Computes orders, patches and neighbours of a level from its voxels, depth and (unshuffled) codes. Returns the orders.
 Orders Finish(Level& level, Codes codes, const Shuffle& shuffle, int64_t patch_size) {
   Orders orders;
   ParallelFor(0, kCurves + 1, 1, [&](int64_t task, int64_t) {

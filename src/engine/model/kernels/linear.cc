@@ -19,7 +19,7 @@ HWY_BEFORE_NAMESPACE();
 namespace anchorsplat {
 namespace HWY_NAMESPACE {
 
-// On a tile that was just written and is still in the first cache.
+// Applies the activation to a tile that is still in the L1 cache.
 void Activate(Activation activation, int64_t rows, int64_t columns, float* const* out) {
   const TileTag d;
   const auto lanes = static_cast<int64_t>(hn::Lanes(d));
@@ -27,7 +27,7 @@ void Activate(Activation activation, int64_t rows, int64_t columns, float* const
   for (int64_t r = 0; r < rows; ++r) {
     const auto apply = [&](float* at) HWY_ATTR {
       const auto x = hn::LoadU(d, at);
-      // not Max(x, 0): what that makes of NaN depends on the machine
+      // not Max(x, 0): its result for NaN depends on the machine
       const auto y = activation == Activation::kGelu ? Gelu(d, x) : hn::IfThenZeroElse(hn::Lt(x, hn::Zero(d)), x);
       hn::StoreU(y, d, at);
     };
@@ -48,12 +48,12 @@ void AddRows(int64_t rows, int64_t columns, const float* const* added, float* co
   }
 }
 
-// Rows [begin, end) in tiles of at most `tile_rows` and `tile_columns`, whose products `multiply(row, rows, column,
-// columns, added, out)` computes.
+// Computes rows [begin, end) in tiles of at most `tile_rows` × `tile_columns`; `multiply(row, rows, column, columns,
+// added, out)` computes a tile's products.
 template <typename Multiply>
 void LinearTiles(const LinearParams& p, int64_t begin, int64_t end, int64_t tile_rows, int64_t tile_columns,
                  const Multiply& multiply) {
-  // A residual joins the sums in registers unless an activation stands between.
+  // Without activation, the residual is added to the sums in registers.
   const bool residual_inside = p.residual != nullptr && p.activation == Activation::kNone;
   const bool residual_after = p.residual != nullptr && !residual_inside;
   constexpr int64_t kMostColumns = 2 * PackedWeights::kPanel;
@@ -67,7 +67,7 @@ void LinearTiles(const LinearParams& p, int64_t begin, int64_t end, int64_t tile
         out[r] = p.out + (row + r) * p.output_stride + column;
         added[r] = p.residual != nullptr ? p.residual + (row + r) * p.output_stride + column : nullptr;
       }
-      float kept[kMostTileRows][kMostColumns];  // the residual may be where the sums go
+      float kept[kMostTileRows][kMostColumns];  // `residual` may be `out`
       if (residual_after) {
         for (int64_t r = 0; r < rows; ++r) {
           std::copy_n(added[r], columns, kept[r]);
@@ -134,10 +134,10 @@ HWY_EXPORT(LinearRowsBFloat16);
 
 namespace {
 
-// A multiple of every tile's rows, so that only the last tile of all is not full. The inputs of a task should stay in
-// the second cache while the weights stream by; what a row becomes does not depend on its task.
+// Rows per task: a multiple of every tile height, so that at most the last tile is not full. A task's inputs should
+// stay in the L2 cache while weights stream by. Results do not depend on it.
 int64_t RowsPerTask(int64_t rows, int64_t depth) {
-  constexpr int64_t kTiles = 2 * 3 * 7;  // of 2, 6 or 14 rows
+  constexpr int64_t kTiles = 2 * 3 * 7;  // tiles have 2, 6 or 14 rows
   constexpr int64_t kInputBytes = int64_t{256} << 10;
   int64_t tasks = std::clamp<int64_t>(kInputBytes / (4 * kTiles * std::max<int64_t>(1, depth)), 1, 5);
   while (tasks > 1 && rows / (kTiles * tasks) < 4 * ThreadCount()) --tasks;

@@ -1,4 +1,5 @@
-// The inner loop of every matrix product of the network, once per SIMD target (no include guard of the usual kind).
+// The inner loop of every matrix product of the network, compiled once per SIMD target (hence the unusual include
+// guard).
 #if defined(ANCHORSPLAT_MODEL_MATRIX_TILE_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef ANCHORSPLAT_MODEL_MATRIX_TILE_INL_H_
 #undef ANCHORSPLAT_MODEL_MATRIX_TILE_INL_H_
@@ -20,10 +21,10 @@ namespace anchorsplat {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// At most a panel wide, so that a panel is a whole number of vectors.
+// At most one panel wide, so that a panel is a whole number of vectors.
 using TileTag = hn::CappedTag<float, PackedWeights::kPanel>;
 
-// A tile's sums stay in registers: rows × vectors of them, plus the vectors of weights and one input.
+// A tile's sums stay in registers: rows × vectors of them, plus vectors of weights and one input.
 #if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL
 inline constexpr int kTilePanels = 2;  // 14 · 2 of 32 registers
 inline constexpr int kTileRows = 14;
@@ -64,7 +65,7 @@ HWY_INLINE void MultiplyTile(const Tile<float>& t) {
     }
   }
   if (t.added != nullptr) {
-    // They are wanted when the products are done: by then they have come nearer.
+    // Needed after the products; prefetched now.
     ANCHORSPLAT_UNROLL
     for (int r = 0; r < kRows; ++r) {
       ANCHORSPLAT_UNROLL

@@ -7,26 +7,26 @@
 
 namespace anchorsplat {
 
-// A few rows and columns of a matrix product, whose sums stay in registers:
-// out[r] = (bias or 0) + (added[r] or 0) + Σ_k input[r·stride + k] · weights[k]. An element T is a float or a pair of
-// consecutive bfloat16, whose product is the sum of both products.
+// A tile of a matrix product whose sums stay in registers:
+// out[r] = (bias or 0) + (added[r] or 0) + Σ_k input[r·stride + k] · weights[k]. T is float, or a pair of consecutive
+// bfloat16 whose product is the sum of both products.
 template <typename T>
 struct Tile {
   int64_t depth;              // K
   const T* input;             // rows of K elements
-  int64_t stride;             // from row to row of `input`
+  int64_t stride;             // elements between rows of `input`
   const T* weights;           // panels [K][kPanel]
-  int64_t panel_stride;       // from panel to panel
+  int64_t panel_stride;       // elements between panels
   const float* bias;          // [columns], whole panels, or null
-  const float* const* added;  // [rows] where the addends of each row begin, or null
-  float* const* out;          // [rows] where the sums of each row go
+  const float* const* added;  // [rows] addends of each row, or null
+  float* const* out;          // [rows] sums of each row
 };
 
-// No tile has more rows than this.
+// Maximum rows of a tile.
 inline constexpr int64_t kMostTileRows = 14;
 
-// A tile whose columns are no whole number of panels. `multiply_panel(rows, tile)` computes a panel; what lies beyond
-// the last column stays untouched.
+// Computes a tile whose width is no whole number of panels, panel by panel with `multiply_panel(rows, tile)`. Does not
+// write beyond the last column.
 template <typename T, typename MultiplyPanel>
 void MultiplyPartialPanels(int64_t rows, int64_t columns, const Tile<T>& t, MultiplyPanel&& multiply_panel) {
   constexpr int64_t kPanel = PackedWeights::kPanel;

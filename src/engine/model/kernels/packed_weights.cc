@@ -11,7 +11,7 @@ namespace {
 
 uint32_t NearestBFloat16(float x) {
   const auto bits = std::bit_cast<uint32_t>(x);
-  if (x != x) return bits >> 16 | 0x40;  // NaN whose low bits would make it infinity
+  if (x != x) return bits >> 16 | 0x40;  // keeps NaN from becoming infinity
   return (bits + 0x7fff + (bits >> 16 & 1)) >> 16;
 }
 

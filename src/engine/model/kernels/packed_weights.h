@@ -6,28 +6,28 @@
 
 namespace anchorsplat {
 
-// Two consecutive inputs in bfloat16, the first in the low half, as the processor's dot products take them.
+// Two consecutive bfloat16 inputs, the first in the low half, as the processor's dot products take them.
 using BFloat16Pair = uint32_t;
 
 enum class WeightPrecision : uint8_t {
   kFloat,
-  kBFloat16,  // weights and inputs are rounded to bfloat16, the sums stay in fp32
+  kBFloat16,  // weights and inputs rounded to bfloat16, sums in fp32
 };
 
-// The matrices of a linear layer or of a convolution in the order in which the matrix kernels read them. Made once per
-// model: the kernels then stream through memory instead of striding over it.
+// Matrices of a linear layer or convolution in the order in which the kernels read them, so that these stream through
+// memory instead of striding. Built once per model.
 //
 // A panel holds kPanel output channels: [inputs][kPanel], channel fastest, or [pairs of inputs][kPanel] in bfloat16.
-// Panels of a tap stand one after the other; channels beyond the last, and the second half of a last pair of an odd
-// number of inputs, are zeros. The layout is the same for every SIMD width.
+// Panels of a tap are contiguous. Zeros fill channels beyond the last, and the missing half of an odd number of inputs.
+// The layout is the same for every SIMD width.
 class PackedWeights {
  public:
   static constexpr int64_t kPanel = 16;
 
   PackedWeights() = default;
 
-  // `weights` as PyTorch stores them, [outputs, taps, inputs] row-major: a linear layer has one tap, a 3×3×3
-  // convolution 27. `bias` [outputs] may be null: zeros.
+  // `weights`: [outputs, taps, inputs] row-major, as PyTorch stores them; 1 tap for a linear layer, 27 for a 3×3×3
+  // convolution. `bias`: [outputs], or null for zeros.
   PackedWeights(const float* weights, const float* bias, int64_t outputs, int64_t inputs, int64_t taps = 1,
                 WeightPrecision precision = WeightPrecision::kFloat);
 

@@ -10,7 +10,7 @@ Buffer<int32_t> PatchPositions(int64_t n, int64_t patch_size) {
   const int64_t padded = PaddedCount(n, patch_size);
   Buffer<int32_t> positions(static_cast<size_t>(padded));
   for (int64_t slot = 0; slot < padded; ++slot) {
-    // A borrowed slot stands one patch after the point it repeats.
+    // A borrowed slot comes one patch after the point it repeats.
     positions[static_cast<size_t>(slot)] = static_cast<int32_t>(slot < n ? slot : slot - patch_size);
   }
   return positions;

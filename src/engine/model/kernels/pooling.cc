@@ -65,7 +65,7 @@ void ClusterMaxCpu(const ClusterMaxParams& p) {
           std::copy(x, x + p.channels, out);
           continue;
         }
-        // NaN wins, as in PyTorch: it must not vanish behind a neighbour.
+        // NaN wins, as in PyTorch: it must not be hidden by a neighbour.
         for (int64_t k = 0; k < p.channels; ++k) out[k] = x[k] > out[k] || x[k] != x[k] ? x[k] : out[k];
       }
       affine_gelu(p.channels, p.scale, p.shift, out);

@@ -4,10 +4,10 @@
 
 namespace anchorsplat {
 
-// Fine to coarse: per cluster the maximum over its points, then BatchNorm in its inference form and GELU.
+// Fine to coarse: maximum over each cluster's points, then inference BatchNorm and GELU.
 struct ClusterMaxParams {
   int64_t fine_count;      // N
-  int64_t coarse_count;    // M, every cluster has a point
+  int64_t coarse_count;    // M; no cluster is empty
   int64_t channels;        // C
   const float* input;      // [N,C]
   const int32_t* cluster;  // [N] 0 … M−1

@@ -13,11 +13,11 @@ enum class ScoreRange : uint8_t {
   kAny,      // at most 125 after the shift, but perhaps far below
 };
 
-// What is subtracted from the scores of each of `count` queries, which are exponents of 2. Softmax does not change with
-// it, so it only has to keep the exponentials in range: of floats, and of fp16 where they are rounded to that. `bounds`
-// hold |q||k| ≥ |q·k| for the longest key; often that is small and nothing needs to be subtracted, or the largest score
-// of a few keys is close enough to the bound to serve for all. Only the rest pays for finding the largest score of all
-// keys. `largest_scores(all)` writes to `shifts` the largest score of each query, of a few keys or of all.
+// Chooses the shift subtracted from each query's scores (exponents of 2). Softmax is invariant to it; it keeps
+// exponentials in range, of float or of fp16 if they are rounded to that. `bounds` holds |q||k| ≥ |q·k| for the longest
+// key: if small, no shift is needed. Else the largest score of a few keys is tried, and the largest of all only if that
+// is too far from the bound. `largest_scores(all)` writes each query's largest score to `shifts`, over all keys or a
+// few.
 template <typename LargestScores>
 ScoreRange ChooseShifts(Rounding rounding, int count, const float* bounds, float* shifts,
                         LargestScores&& largest_scores) {

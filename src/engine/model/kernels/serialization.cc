@@ -13,7 +13,7 @@ namespace anchorsplat {
 
 namespace {
 
-// Bits of a 21-bit number moved to every third place.
+// Spreads the bits of a 21-bit number to every third place.
 uint64_t Spread(uint64_t v) {
   v &= 0x1fffff;
   v = (v | v << 32) & 0x001f00000000ffffull;
@@ -39,7 +39,7 @@ uint64_t Hilbert(int depth, std::array<uint32_t, 3> v) {
       }
     }
   }
-  // Gray to binary over the whole word, not per axis.
+  // Gray decoding over the whole word, not per axis.
   uint64_t code = Interleave(v[0], v[1], v[2]);
   for (int shift = 1; shift < 64; shift *= 2) code ^= code >> shift;
   return code;
@@ -70,7 +70,7 @@ void CurveCodes(Curve curve, int depth, std::span<const int32_t> voxels, std::sp
 }
 
 Buffer<int32_t> OrderOfCodes(std::span<const int64_t> codes) {
-  // Radix sort from the least significant digit: stable, and codes have few bits (27 at a resolution of 384).
+  // LSD radix sort: stable, and codes have few bits (27 at a resolution of 384).
   constexpr int kDigitBits = 11;
   constexpr size_t kDigits = size_t{1} << kDigitBits;
   const size_t n = codes.size();
@@ -105,7 +105,7 @@ Status Validate(const Shuffles& shuffles) {
 }
 
 Shuffles ShufflesFromSeed(uint64_t seed) {
-  // PyTorch's CPU generator is MT19937 seeded with the low 32 bits; randperm of a few elements exchanges element i with
+  // PyTorch's CPU generator is MT19937 seeded with the low 32 bits; randperm of few elements swaps element i with
   // element i + (random % (n − i)).
   std::mt19937 generator(static_cast<uint32_t>(seed));
   Shuffles shuffles = kNoShuffles;

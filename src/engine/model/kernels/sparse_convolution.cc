@@ -21,10 +21,9 @@
 #define ANCHORSPLAT_SPARSE_CONVOLUTION_ONCE
 namespace anchorsplat {
 
-// Rows of the output that one task computes, with the pairs of one offset among them. Enough that most tiles of an
-// offset are full, few enough that their sums stay in the second cache.
+// Output rows per task. Large enough to fill most tiles of an offset, small enough that sums stay in the L2 cache.
 constexpr int64_t kConvolutionRows = 512;
-// Output channels of a task: the weights of one offset stay in the second cache too.
+// Output channels per task: one offset's weights stay in the L2 cache too.
 constexpr int64_t kConvolutionColumns = 256;
 
 struct ConvolutionScratch {
@@ -41,9 +40,9 @@ HWY_BEFORE_NAMESPACE();
 namespace anchorsplat {
 namespace HWY_NAMESPACE {
 
-// Rows [begin, end) and output channels [first, last) of the convolution, in tiles of at most `tile_rows` and
-// `tile_columns`. `gather(slot, row)` puts the inputs of a row into a slot of the tile, `multiply(k, column, rows,
-// columns, out)` adds the products of the tile to the sums.
+// Convolves rows [begin, end) and output channels [first, last), in tiles of at most `tile_rows` × `tile_columns`.
+// `gather(slot, row)` copies a row's inputs into a slot of the tile. `multiply(k, column, rows, columns, out)` adds the
+// tile's products to the sums.
 template <typename Gather, typename Multiply>
 void ConvolveTiles(const SparseConvolutionParams& p, int64_t begin, int64_t end, int64_t first, int64_t last,
                    int64_t tile_rows, int64_t tile_columns, ConvolutionScratch& scratch, const Gather& gather,
@@ -63,7 +62,7 @@ void ConvolveTiles(const SparseConvolutionParams& p, int64_t begin, int64_t end,
     for (int64_t i = 0; i < pairs; i += tile_rows) {
       const int64_t rows = std::min<int64_t>(tile_rows, pairs - i);
       for (int64_t r = 0; r < rows; ++r) gather(r, scratch.sources[i + r]);
-      // The rows of the next tile come nearer meanwhile.
+      // Prefetches the next tile's rows.
       for (int64_t r = i + rows; r < std::min(pairs, i + 2 * tile_rows); ++r) {
         const float* ahead = p.input + scratch.sources[r] * w.inputs();
         for (int64_t c = 0; c < w.inputs(); c += 64 / sizeof(float)) hwy::Prefetch(ahead + c);
@@ -141,7 +140,7 @@ void SparseConvolutionCpu(const SparseConvolutionParams& p) {
                             : HWY_DYNAMIC_DISPATCH(ConvolveBlock);
   const int64_t outputs = p.weights->outputs();
   const int64_t column_blocks = (outputs + kConvolutionColumns - 1) / kConvolutionColumns;
-  // A row's sum is the same in whichever block it stands, so that many threads may have smaller ones.
+  // A row's sum does not depend on its block, so more threads may use smaller ones.
   int64_t block = kConvolutionRows;
   while (block > 64 && (p.count + block - 1) / block * column_blocks < 4 * ThreadCount()) block /= 2;
   const int64_t row_blocks = (p.count + block - 1) / block;

@@ -6,8 +6,8 @@
 
 namespace anchorsplat {
 
-// A submanifold 3×3×3 convolution (Graham et al. 2018): out[i] = b + Σ_k W_k · input[neighbours[i,k]] over the
-// neighbours that are there. The sum runs over k in ascending order.
+// Submanifold 3×3×3 convolution (Graham et al. 2018): out[i] = b + Σ_k W_k · input[neighbours[i,k]] over existing
+// neighbours, k ascending.
 struct SparseConvolutionParams {
   int64_t count;                 // N points
   const float* input;            // [N, weights.inputs()]
@@ -16,7 +16,7 @@ struct SparseConvolutionParams {
   // out
   float* out;  // [N, weights.outputs()]; must not overlap `input`
 };
-// The same bits for any number of threads. Inputs are gathered tile by tile, never 27 copies of them.
+// The same bits for any number of threads. Gathers inputs per tile, so the 27-fold copy never exists.
 void SparseConvolutionCpu(const SparseConvolutionParams& p);
 
 }  // namespace anchorsplat

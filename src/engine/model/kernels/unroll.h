@@ -1,7 +1,6 @@
 #pragma once
 
-// Before a loop whose count is a constant: the arrays of vectors it walks must end up in registers, and they only do
-// when no index is left.
+// Put before a loop of constant count. Arrays of vectors it indexes go to registers only if fully unrolled.
 #if defined(__clang__)
 #define ANCHORSPLAT_UNROLL _Pragma("clang loop unroll(full)")
 #elif defined(__GNUC__)

@@ -1,4 +1,4 @@
-// Functions on SIMD vectors of floats, once per SIMD target (no include guard of the usual kind).
+// Functions on SIMD vectors of floats, compiled once per SIMD target (hence the unusual include guard).
 #if defined(ANCHORSPLAT_MODEL_VECTOR_MATH_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef ANCHORSPLAT_MODEL_VECTOR_MATH_INL_H_
 #undef ANCHORSPLAT_MODEL_VECTOR_MATH_INL_H_
@@ -17,7 +17,7 @@ namespace anchorsplat {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// 2^f for |f| ≤ 1/2, relative error 8e-8: the minimax polynomial of degree 5 (Remez, relative weight).
+// 2^f for |f| ≤ 1/2, relative error 8e-8: minimax polynomial of degree 5 (Remez, relative weight).
 template <class D, class V = hn::VFromD<D>>
 HWY_INLINE V Exp2Fraction(D d, V f) {
   V p = hn::Set(d, 0.00132764719794792f);
@@ -28,10 +28,10 @@ HWY_INLINE V Exp2Fraction(D d, V f) {
   return hn::MulAdd(p, f, hn::Set(d, 1.0000000716546822f));
 }
 
-// Adding 1.5·2^23 rounds to the nearest integer and leaves that integer in the low bits of the sum.
+// Adding 1.5·2^23 rounds to the nearest integer and leaves it in the sum's low bits.
 inline constexpr float kToInteger = 12582912.0f;
 
-// 2^x for |x| ≤ 125, where neither x nor the result needs care; NaN gives something.
+// 2^x for |x| ≤ 125, without range checks; the result for NaN is undefined.
 template <class D, class V = hn::VFromD<D>>
 HWY_INLINE V Exp2Bounded(D d, V x) {
   const hn::RebindToSigned<D> di;
@@ -41,7 +41,7 @@ HWY_INLINE V Exp2Bounded(D d, V x) {
   return hn::BitCast(d, hn::Add(hn::BitCast(di, Exp2Fraction(d, f)), exponent));
 }
 
-// 2^x for x ≤ 125, 0 below −126 (no subnormals); NaN stays NaN.
+// 2^x for x ≤ 125; 0 below −126 (no subnormals); NaN stays NaN.
 template <class D, class V = hn::VFromD<D>>
 HWY_INLINE V Exp2(D d, V x) {
   const hn::RebindToSigned<D> di;
@@ -81,13 +81,13 @@ HWY_INLINE V Gelu(D d, V x) {
   return hn::MulAdd(half, Erf(d, hn::Mul(x, hn::Set(d, 0.70710678118654752f))), half);
 }
 
-// To the nearest fp16 value, ties to even, as a float: infinity from 65520, subnormals kept, NaN stays NaN.
+// Rounds to the nearest fp16 value, ties to even, as a float: infinity from 65520, subnormals kept, NaN stays NaN.
 template <class D, class V = hn::VFromD<D>>
 HWY_INLINE V RoundToHalf(D d, V x) {
 #if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL || HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_NEON
   return hn::PromoteTo(d, hn::DemoteTo(hn::Rebind<hwy::float16_t, D>(), x));
 #else
-  // Without an instruction for it, and Highway's substitute truncates.
+  // These targets have no instruction for it, and Highway's emulation truncates.
   const hn::RebindToUnsigned<D> du;
   const V magnitude = hn::Abs(x);
   const auto bits = hn::BitCast(du, magnitude);
@@ -102,7 +102,7 @@ HWY_INLINE V RoundToHalf(D d, V x) {
 #endif
 }
 
-// To the nearest bfloat16 value, ties to even, as a float; NaN stays NaN.
+// Rounds to the nearest bfloat16 value, ties to even, as a float; NaN stays NaN.
 template <class D, class V = hn::VFromD<D>>
 HWY_INLINE V RoundToBFloat16(D d, V x) {
   const hn::RebindToUnsigned<D> du;

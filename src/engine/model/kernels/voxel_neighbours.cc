@@ -12,12 +12,12 @@ namespace {
 
 constexpr uint64_t kEmpty = std::numeric_limits<uint64_t>::max();
 
-// Voxel coordinates moved by one, so that an offset of −1 stays non-negative and finds nothing.
+// Shifted by one, so that an offset of −1 stays non-negative and is simply not found.
 uint64_t Key(int32_t x, int32_t y, int32_t z) {
   return static_cast<uint64_t>(x + 1) << 42 | static_cast<uint64_t>(y + 1) << 21 | static_cast<uint64_t>(z + 1);
 }
 
-// Open addressing from voxel to its winner.
+// Hash map (open addressing) from voxel to its winner.
 class VoxelMap {
  public:
   explicit VoxelMap(std::span<const int32_t> voxels) {
@@ -31,7 +31,7 @@ class VoxelMap {
       size_t slot = Slot(key);
       while (keys_[slot] != kEmpty && keys_[slot] != key) slot = (slot + 1) & mask_;
       keys_[slot] = key;
-      winners_[slot] = static_cast<int32_t>(i);  // ascending rows: the largest stays
+      winners_[slot] = static_cast<int32_t>(i);  // rows ascend, so the largest stays
     }
   }
 

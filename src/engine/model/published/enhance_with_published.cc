@@ -22,14 +22,14 @@ namespace {
 constexpr float kLargestLogit = 20;
 constexpr float kMaxLogScale = 5;
 constexpr float kLargestSh = 10;
-// Anchors whose Gaussians are made at once: 20 copies of them are 5 MB and stay in the cache until they are restored.
+// Anchors whose Gaussians are made at once: their 20 copies take 5 MB and stay in the cache until denormalised.
 constexpr int64_t kHeadRows = 1024;
 constexpr uint64_t kUpstreamSubsetSeed = 918;
 
-// What is legal and infinite (core/gaussian_cloud.h, IsUsable) as the nearest that a network can read: opacities of 0
-// and 1, and the missing lengths of flat Gaussians, thin beside their longest axis. Nothing where all is finite.
+// Replaces legal infinities (core/gaussian_cloud.h, IsUsable) by the nearest values the network can read: opacities 0
+// and 1, and zero lengths of flat Gaussians, thin beside their longest axis. Empty if all values are finite.
 std::optional<GaussianCloud> WithoutInfinities(const GaussianCloud& cloud) {
-  constexpr float kThin = 10, kPoint = -20;  // logarithms: 1/22,000 of the longest axis; a length of 2e-9
+  constexpr float kThin = 10, kPoint = -20;  // ln: 1/22,000 of the longest axis; a length of 2e-9
   const auto infinite = [](float x) { return std::isinf(x); };
   if (std::none_of(cloud.opacity_logits.begin(), cloud.opacity_logits.end(), infinite) &&
       std::none_of(cloud.log_scales.begin(), cloud.log_scales.end(), infinite)) {
@@ -49,7 +49,7 @@ std::optional<GaussianCloud> WithoutInfinities(const GaussianCloud& cloud) {
   return finite;
 }
 
-// torch.randperm(n)[:count] of PyTorch's CPU generator.
+// torch.randperm(n)[:count] on PyTorch's CPU generator.
 std::vector<int64_t> RandomChoice(std::vector<int64_t> rows, int64_t count) {
   std::mt19937 generator(static_cast<uint32_t>(kUpstreamSubsetSeed));
   const size_t n = rows.size();
@@ -58,7 +58,7 @@ std::vector<int64_t> RandomChoice(std::vector<int64_t> rows, int64_t count) {
   return rows;
 }
 
-// Adds a block's share of a Gaussian in normalised space to output row `row`, in world space.
+// Adds `weight` times a Gaussian, converted from normalised to world space, to output row `row`.
 void AddRestored(const float* gaussian, const Normalisation& normalisation, float log_scale, float weight, int64_t row,
                  GaussianCloud& out) {
   const auto add = [weight](float& sum, float value) { sum = weight == 1 ? value : sum + weight * value; };
@@ -71,8 +71,8 @@ void AddRestored(const float* gaussian, const Normalisation& normalisation, floa
   for (int64_t c = 0; c < 48; ++c) add(out.sh.data()[48 * row + c], gaussian[11 + c]);
 }
 
-// Bounds of the release, and unit quaternions. Infinities and NaN are no values to clamp: such rows go, as upstream
-// looks for them before it clamps.
+// Applies the release's bounds and normalises quaternions. Rows with NaN or infinity are left for DropRows: upstream
+// too checks before it clamps.
 void Finish(float anchor_log_scale, bool upstream, int64_t row, GaussianCloud& out) {
   const auto clamp = [](float& value, float low, float high) {
     if (std::isfinite(value)) value = std::clamp(value, low, high);
@@ -85,7 +85,7 @@ void Finish(float anchor_log_scale, bool upstream, int64_t row, GaussianCloud& o
   for (int64_t c = 0; c < 48; ++c) clamp(out.sh.data()[48 * row + c], -kLargestSh, kLargestSh);
   if (upstream) return;
   float* quat = out.quats.data() + 4 * row;
-  double square = 0;  // in double: squares of large floats are infinite, of small ones zero
+  double square = 0;  // in double: squares of floats may overflow or underflow
   for (int c = 0; c < 4; ++c) square += double{quat[c]} * quat[c];
   const double norm = std::sqrt(square);
   if (norm > 0) {
@@ -95,9 +95,9 @@ void Finish(float anchor_log_scale, bool upstream, int64_t row, GaussianCloud& o
   }
 }
 
-// The normalisation that brings a block's cube to [0,1]³.
+// The normalisation that maps a block's cube to [0,1]³.
 Normalisation NormalisationOf(const SpatialBlock& block, const Normalisation& whole) {
-  // The block's cube is given in the coordinates of the whole cloud's cube.
+  // The block's cube is in coordinates of the whole cloud's cube.
   Normalisation result = whole;
   result.scale = static_cast<float>(whole.scale / block.side);
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -120,7 +120,7 @@ void SetZero(GaussianCloud& cloud) {
   }
 }
 
-// Rows that are not finite or not visible leave, the others close up.
+// Removes rows that are not finite or not visible.
 void DropRows(GaussianCloud& out, const PublishedOptions& options, PublishedReport& report) {
   const float logit = options.prune_opacity > 0
                           ? std::log(options.prune_opacity) - std::log1p(-std::min(options.prune_opacity, 0.999999f))
@@ -147,7 +147,7 @@ void DropRows(GaussianCloud& out, const PublishedOptions& options, PublishedRepo
   if (kept != out.size()) out.Resize(kept, out.sh_degree);
 }
 
-// One block through the network, into the rows of its own Gaussians.
+// Runs one block through the network and adds the result to its Gaussians' rows.
 Status EnhanceBlock(const GaussianCloud& cloud, std::span<const int64_t> anchors, const SpatialBlock& block,
                     const Normalisation& normalisation, const PublishedNetwork& network,
                     const PublishedOptions& options, GaussianCloud& out, Progress& progress) {
@@ -194,7 +194,7 @@ Status EnhanceBlock(const GaussianCloud& cloud, std::span<const int64_t> anchors
   return {};
 }
 
-// The rows that the network can read, at most options.max_gaussians of them.
+// Rows the network can read, at most options.max_gaussians.
 Result<std::vector<int64_t>> ChooseAnchors(const GaussianCloud& cloud, const PublishedOptions& options,
                                            PublishedReport& report) {
   std::vector<int64_t> anchors;
@@ -220,8 +220,8 @@ Result<std::vector<int64_t>> ChooseAnchors(const GaussianCloud& cloud, const Pub
                cloud.empty() ? "the splat has no Gaussians" : "no Gaussian of the splat has finite values"};
 }
 
-// The anchors' means in the cube. Outside it there is no grid: upstream drops what rounding left there, the default
-// only what a given mode (unit) truly leaves out.
+// The anchors' means in the cube. Drops those outside it, where there is no grid: with `upstream` also those that
+// rounding left just outside, by default only those that kUnit truly excludes.
 Result<Buffer<float>> PlacesInCube(const GaussianCloud& cloud, const PublishedOptions& options,
                                    std::vector<int64_t>& anchors, PublishedReport& report) {
   Buffer<float> positions(anchors.size() * 3);
@@ -253,7 +253,7 @@ Result<Buffer<float>> PlacesInCube(const GaussianCloud& cloud, const PublishedOp
   return positions;
 }
 
-// Copies of all anchors, block by block.
+// Makes the copies of all anchors, block by block.
 Result<GaussianCloud> EnhanceBlocks(const GaussianCloud& cloud, std::span<const int64_t> anchors,
                                     Buffer<float> positions, const PublishedNetwork& network,
                                     const PublishedOptions& options, PublishedReport& report) {
@@ -268,7 +268,7 @@ Result<GaussianCloud> EnhanceBlocks(const GaussianCloud& cloud, std::span<const 
   }
   GaussianCloud out;
   out.Resize(report.anchors * network.config().copies, kMaxShDegree);
-  if (blocks.size() > 1) SetZero(out);  // blocks add their shares
+  if (blocks.size() > 1) SetZero(out);  // blocks add their weighted results
   Progress progress("Network", report.anchors);
   for (const SpatialBlock& block : blocks) {
     const Normalisation normalisation =
@@ -278,7 +278,7 @@ Result<GaussianCloud> EnhanceBlocks(const GaussianCloud& cloud, std::span<const 
   return out;
 }
 
-// Bounds of what came out, and what of it stays.
+// Bounds all output rows, then drops the unusable ones.
 void FinishRows(const GaussianCloud& cloud, std::span<const int64_t> anchors, const PublishedOptions& options,
                 GaussianCloud& out, PublishedReport& report) {
   ParallelFor(0, out.size(), 4096, [&](int64_t first, int64_t last) {

@@ -6,7 +6,7 @@ namespace anchorsplat {
 
 namespace {
 
-// Flat index of `f_rest` in the file's order (all of red, then green, then blue) and back to [coefficient, rgb].
+// With kScrambled, maps through the file's flat f_rest order (all of red, then green, then blue) as the release does.
 float RestValue(const float* sh, int rest_coefficients, int64_t coefficient, int64_t rgb, ShPadding padding) {
   if (padding == ShPadding::kScrambled && rest_coefficients > 0) {
     const int64_t flat = rgb * 15 + coefficient;

@@ -10,14 +10,14 @@
 
 namespace anchorsplat {
 
-// What becomes of a cloud with fewer than 15 higher SH coefficients.
+// How a cloud with fewer than 15 higher SH coefficients is padded.
 enum class ShPadding {
   kZeros,      // missing coefficients are zero
-  kScrambled,  // as the release does it: zeros after the file's channel-major list, which is then read as if it were
-               // complete, so that all 9 values of degree 1 become coefficients of red; the same for degrees 0 and 3
+  kScrambled,  // as the release: appends zeros to the file's channel-major list and reads it as if it were complete, so
+               // all 9 values of degree 1 become coefficients of red. Degrees 0 and 3 are unaffected
 };
 
-// The network's input rows [N,59] of a cloud: normalised, in the order of kAttributes. Rows are those of `rows`.
+// Input rows [rows,59] of the network for the given rows of a cloud: normalised, columns as in kAttributes.
 Buffer<float> FeatureRows(const GaussianCloud& cloud, std::span<const int64_t> rows, const Normalisation& normalisation,
                           ShPadding padding);
 

@@ -13,8 +13,8 @@
 
 namespace anchorsplat {
 
-// A run of the published network, for tests: 1,500 points with shared voxels and a padded patch, K = 2, weights from
-// HashWeights; its inputs, outputs and statistics per stage, with the five shuffles it drew.
+// A recorded run of the published network: 1,500 points with shared voxels and a padded patch, K = 2, HashWeights.
+// Holds inputs, outputs, statistics per stage and the five shuffles that were drawn.
 struct GoldenRun {
   nlohmann::json manifest;
   int64_t count = 0;

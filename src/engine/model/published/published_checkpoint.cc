@@ -12,9 +12,9 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr const char* kArchitecture = "architecture";  // for people
+constexpr const char* kArchitecture = "architecture";  // informative only
 
-// The first few of them and how many there are more.
+// The first few names, and the number of the rest.
 std::string SomeOf(const std::vector<std::string>& names) {
   constexpr size_t kShown = 3;
   std::string text;
@@ -66,7 +66,7 @@ Result<Checkpoint> Checkpoint::Open(const std::filesystem::path& path) {
     }
   }
 
-  // Missing ones first: a wrong shape often follows from them.
+  // Missing tensors first: a wrong shape often follows from them.
   std::vector<std::string> missing, unknown;
   std::set<std::string> expected;
   const std::vector<TensorSpec> tensors = PublishedTensors(*config);

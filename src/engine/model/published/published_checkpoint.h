@@ -12,24 +12,24 @@
 
 namespace anchorsplat {
 
-// What the metadata of a checkpoint says about its architecture, read off its tensors: architecture, K, epsilon,
-// grid_resolution, patch_size, encoder and decoder widths, blocks and heads.
+// Architecture metadata for a checkpoint: architecture, K, epsilon, grid_resolution, patch_size, encoder and decoder
+// widths, blocks and heads.
 std::map<std::string, std::string> ArchitectureMetadata(const PublishedConfig& config);
 
-// A file of the network's weights (.pth of torch.save, .safetensors), checked against the network it describes.
+// A weights file of the published network (.pth of torch.save, or .safetensors), validated against its architecture.
 class Checkpoint {
  public:
-  // K, widths, stages and blocks are read from the tensors' shapes. Errors: those of TensorFile::Open; kBadFile with
-  // the path when the file is no AnchorSplat checkpoint, when tensors are missing or belong to nothing (named), or when
-  // one has another shape than its neighbours ask for (named, with both shapes). Tensors called num_batches_tracked may
-  // be absent: inference does not need them. Metadata that says another architecture is kBadFile too: heads, patch size
-  // and ε are in no shape. Values are looked at when they are loaded.
+  // Opens a checkpoint; K, widths, stages and blocks follow from tensor shapes. Validates names and shapes; values are
+  // checked when loaded. num_batches_tracked tensors are optional: inference does not need them.
+  // Errors: those of TensorFile::Open; kBadFile with the path if this is no AnchorSplat checkpoint, if tensors are
+  // missing or unknown (named), if a shape contradicts the others (named, with both shapes), or if the metadata names
+  // another architecture (no shape encodes heads, patch size and ε).
   static Result<Checkpoint> Open(const std::filesystem::path& path);
 
   const PublishedConfig& config() const { return config_; }
   const TensorFile& file() const { return file_; }
 
-  // Reads from the file, which this object must outlive. Errors are those of TensorFile::ReadFloat32.
+  // Reads tensors from the file; this object must outlive the source. Errors: those of TensorFile::ReadFloat32.
   WeightSource Weights() const;
 
  private:
@@ -39,7 +39,7 @@ class Checkpoint {
   PublishedConfig config_;
 };
 
-// The network of a checkpoint, ready for inference. Errors: of Checkpoint::Open; weights that are NaN or infinite.
+// Loads a checkpoint for inference. Errors: those of Checkpoint::Open; NaN or infinite weights.
 Result<PublishedNetwork> LoadPublishedNetwork(const std::filesystem::path& path,
                                               WeightPrecision precision = WeightPrecision::kFloat);
 

@@ -8,8 +8,8 @@
 
 namespace anchorsplat {
 
-// Writes a checkpoint of any readable kind as .safetensors: the tensors as they are, its own metadata, and what
-// ArchitectureMetadata says. Errors: those of Checkpoint::Open and WriteSafetensors.
+// Converts any readable checkpoint to .safetensors: tensors unchanged, its metadata plus ArchitectureMetadata. Errors:
+// those of Checkpoint::Open and WriteSafetensors.
 Status ConvertCheckpoint(const std::filesystem::path& from, const std::filesystem::path& to,
                          const WriteOptions& options);
 

@@ -13,7 +13,7 @@ namespace {
 
 const std::string kBackbone = "backbone.backbone.";
 
-// Appends tensors under growing name prefixes, in the order in which PyTorch lists a module's state.
+// Lists tensors with name prefixes, in PyTorch's order of a module's state.
 class Listing {
  public:
   void Linear(const std::string& name, int64_t out, int64_t in) { WeightAndBias(name, {out, in}); }
@@ -112,7 +112,7 @@ std::vector<TensorSpec> PublishedTensors(const PublishedConfig& config) {
 Result<PublishedConfig> ConfigOfTensors(std::span<const TensorSpec> tensors) {
   std::map<std::string, const TensorSpec*> by_name;
   for (const TensorSpec& tensor : tensors) by_name[tensor.name] = &tensor;
-  // Length of dimension 0 of a tensor with that many dimensions; 0 when there is no such tensor.
+  // Dimension 0 of a tensor with that many dimensions; 0 if there is none.
   const auto rows = [&](const std::string& name, size_t dimensions) -> int64_t {
     const auto found = by_name.find(name);
     return found != by_name.end() && found->second->shape.size() == dimensions ? found->second->shape[0] : 0;
@@ -172,7 +172,7 @@ Buffer<int32_t> GridVoxels(const float* features, int64_t count, int64_t stride)
   ParallelFor(0, count, 8192, [&](int64_t begin, int64_t end) {
     for (int64_t i = begin; i < end; ++i) {
       for (int64_t axis = 0; axis < 3; ++axis) {
-        // 384 itself occurs, where a coordinate is exactly 1.
+        // A coordinate of exactly 1 gives 384.
         const float scaled = features[i * stride + axis] * static_cast<float>(kGridResolution);
         voxels[static_cast<size_t>(3 * i + axis)] = static_cast<int32_t>(std::floor(scaled));
       }

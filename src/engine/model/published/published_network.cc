@@ -18,8 +18,8 @@ namespace anchorsplat {
 
 namespace {
 
-// Hidden activations of the MLPs and heads are made for a part of the rows at a time, this many bytes of them: they
-// then stay in the last cache and memory does not grow with the cloud.
+// Bytes of hidden activations of MLPs and heads computed at once: they stay in the last-level cache, and memory does
+// not grow with the cloud.
 constexpr int64_t kHiddenBytes = int64_t{8} << 20;
 
 int64_t ChunkRows(int64_t hidden) { return std::max<int64_t>(256, kHiddenBytes / (int64_t{4} * hidden)); }
@@ -40,13 +40,13 @@ void Linear(int64_t rows, const float* input, const PackedWeights& weights, floa
              .output_stride = weights.outputs()});
 }
 
-// Four times as fast as std::tanh, and as good where it is scaled by ε and added to a mean.
+// Four times as fast as std::tanh; accurate enough when scaled by ε and added to a mean.
 float Tanh(float x) { return 1 - 2 / (std::exp(2 * x) + 1); }
 
 float* Sized(Buffer<float>& buffer, int64_t rows, int64_t channels) {
   const auto count = static_cast<size_t>(rows * channels);
   if (buffer.size() < count) {
-    buffer = {};  // nothing of it is needed any more: free before the larger one is taken
+    buffer = {};  // frees the old memory before allocating more
     buffer.resize(count);
   }
   return buffer.data();
@@ -54,14 +54,14 @@ float* Sized(Buffer<float>& buffer, int64_t rows, int64_t channels) {
 
 }  // namespace
 
-// Arrays that every block needs, as large as the largest block wants them.
+// Scratch arrays shared by all blocks, sized for the largest.
 struct PublishedNetwork::Workspace {
   Buffer<float> a, b;    // [N,C]
   Buffer<float> qkv;     // [N,3C]
   Buffer<float> hidden;  // [chunk,4C]
 };
 
-// Takes tensors by name from the source and checks that they are numbers.
+// Reads tensors by name and checks that values are finite.
 class PublishedNetwork::Loader {
  public:
   Loader(const PublishedConfig& config, const WeightSource& source, WeightPrecision precision)
@@ -69,7 +69,7 @@ class PublishedNetwork::Loader {
     for (TensorSpec& tensor : PublishedTensors(config)) tensors_.emplace(tensor.name, std::move(tensor));
   }
 
-  // Empty after the first error, which `status` keeps.
+  // Empty after the first error, which is kept in `status`.
   Buffer<float> Values(const std::string& name) {
     const TensorSpec& tensor = tensors_.at(name);
     int64_t count = 1;
@@ -91,7 +91,7 @@ class PublishedNetwork::Loader {
     return {Values(name + ".weight"), Values(name + ".bias")};
   }
 
-  // BatchNorm with its running statistics as scale and shift.
+  // BatchNorm with running statistics, as scale and shift.
   PublishedNetwork::Norm BatchNorm(const std::string& name) {
     Norm norm = LayerNorm(name);
     const Buffer<float> mean = Values(name + ".running_mean"), variance = Values(name + ".running_var");
@@ -114,7 +114,7 @@ class PublishedNetwork::Loader {
     return PackedWeights(weight.data(), bias.data(), tensor.shape[0], tensor.shape.back(), taps, precision_);
   }
 
-  // A linear layer with the BatchNorm that follows it.
+  // A linear layer fused with the BatchNorm that follows it.
   PackedWeights LinearThenNorm(const std::string& name, const std::string& norm_name) {
     const TensorSpec& tensor = tensors_.at(name + ".weight");
     const Norm norm = BatchNorm(norm_name);
@@ -140,7 +140,7 @@ class PublishedNetwork::Loader {
             .norm2 = LayerNorm(name + ".norm2.0")};
   }
 
-  // The last layer of a head with the embeddings of the copies in its bias.
+  // A head's last layer, with the copies' embeddings in its bias.
   PackedWeights LastOfHead(const std::string& name, const std::string& embedding_name) {
     const TensorSpec& tensor = tensors_.at(name + ".weight");
     const Buffer<float> weight = Values(name + ".weight"), embedding = Values(embedding_name);

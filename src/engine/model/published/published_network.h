@@ -15,31 +15,29 @@
 
 namespace anchorsplat {
 
-// The network for inference on the CPU: Point Transformer V3 and the heads as a row of kernel calls on raw arrays, with
-// weights in the kernels' order and every BatchNorm folded into the linear layer before it where nothing stands
-// between. The torch modules in torch/ are the same network for training and other devices; a test holds the two
-// together.
+// The published network for CPU inference: Point Transformer V3 and the heads as kernel calls on raw arrays. Weights
+// are packed for the kernels; each BatchNorm is folded into the linear layer before it unless something lies between.
+// torch/ has the same network for training and other devices; a test compares the two.
 class PublishedNetwork {
  public:
-  // Errors: of Validate(config) and of `source`; kBadFile naming the tensor when a weight is NaN or infinite.
-  //
-  // kBFloat16 rounds weights and inputs of the blocks' matrices and convolutions, and the attention as
-  // Rounding::kBFloat16 does; sums, the residual stream, norms and softmax stay in fp32, and so do the embedding and
-  // the last layers of the heads, which cost little and show most.
+  // Loads and packs the weights. kBFloat16 rounds weights and inputs of the blocks' matrices and convolutions to
+  // bfloat16, and the attention as Rounding::kBFloat16. Sums, residual stream, norms and softmax stay in fp32, as do
+  // the embedding and the heads' last layers, which cost little and matter most.
+  // Errors: those of Validate(config) and `source`; kBadFile naming the tensor if a weight is NaN or infinite.
   static Result<PublishedNetwork> Load(const PublishedConfig& config, const WeightSource& source,
                                        WeightPrecision precision = WeightPrecision::kFloat);
 
   const PublishedConfig& config() const { return config_; }
   WeightPrecision precision() const { return precision_; }
 
-  // features [N,59] of the normalised cloud (kAttributes) → context [N, config().context_channels()]. `levels`: of
-  // these N points (BuildHierarchy with HierarchyOptionsFor). `rounding`: of the attention's arithmetic; kNone leaves
-  // it to the precision of the weights. The same bits for any number of threads. Needs about 40 · decoder width · N
-  // bytes besides.
+  // Runs the backbone: context [N, config().context_channels()] for features [N,59] of the normalised cloud
+  // (kAttributes). `levels`: of these N points (BuildHierarchy with HierarchyOptionsFor). `rounding`: of the attention;
+  // kNone follows the weights' precision. Needs about 40 · decoder width · N bytes of scratch memory. The same bits for
+  // any number of threads.
   Buffer<float> Context(const float* features, std::span<const Level> levels, Rounding rounding = Rounding::kNone,
                         NetworkProfile* profile = nullptr) const;
 
-  // The Gaussians of n anchors in normalised, stored space: out [K,n,59], copy k of all anchors before copy k + 1.
+  // Runs the heads on n anchors: out [K,n,59] in normalised, stored space; copy k of all anchors precedes copy k + 1.
   void Gaussians(const float* context, const float* features, int64_t n, float* out,
                  NetworkProfile* profile = nullptr) const;
 
@@ -56,7 +54,7 @@ class PublishedNetwork {
   };
   struct Stage {
     PackedWeights down;         // encoder stages from the second on
-    Norm down_norm;             // the BatchNorm after the maximum as scale and shift
+    Norm down_norm;             // the BatchNorm after the max pooling, as scale and shift
     PackedWeights up, up_skip;  // decoder stages
     std::vector<Block> blocks;
   };
@@ -74,7 +72,7 @@ class PublishedNetwork {
   PackedWeights embedding_;
   std::vector<Stage> encoder_;  // finest first
   std::vector<Stage> decoder_;  // finest first
-  PackedWeights head_first_;    // of all six heads, one above the other: they read the same input
+  PackedWeights head_first_;    // first layers of all six heads, stacked: they share their input
   std::vector<Head> heads_;
 };
 

@@ -6,7 +6,7 @@
 
 namespace anchorsplat {
 
-// Where a forward pass spends its time, and how much arithmetic that was.
+// Steps of a forward pass, for profiling.
 enum class NetworkStep { kLevels, kConvolution, kAttention, kLinear, kMlp, kNorm, kPooling, kHeads };
 inline constexpr const char* kNetworkStepNames[] = {"levels", "convolution", "attention", "linear",
                                                     "mlp",    "norm",        "pooling",   "heads"};
@@ -28,7 +28,7 @@ struct NetworkProfile {
   }
 };
 
-// Adds the time it lives to a step; does nothing without a profile.
+// Adds its lifetime to a step of the profile; a null profile is ignored.
 class ProfileScope {
  public:
   ProfileScope(NetworkProfile* profile, NetworkStep step, double multiply_adds = 0)

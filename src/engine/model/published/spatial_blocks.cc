@@ -52,7 +52,7 @@ void Split(std::span<const float> positions, Cell cell, int depth, int64_t most,
   for (Cell& child : children) Split(positions, std::move(child), depth + 1, most, leaves);
 }
 
-// Largest distance along an axis from a point to a cell, 0 inside.
+// Maximum over the axes of the distance from a point to a cell, 0 inside.
 double Distance(const float* point, const Cell& cell) {
   double distance = 0;
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -61,7 +61,7 @@ double Distance(const float* point, const Cell& cell) {
   return distance;
 }
 
-// 1 deep inside, 1/2 on a face, 0 at the margin's end; the product over the axes.
+// Per axis 1 deep inside, 1/2 on a face, 0 at the margin's end; multiplied over the axes.
 double Weight(const float* point, const Cell& cell, double margin) {
   double weight = 1;
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -108,7 +108,7 @@ SpatialBlock WithMargin(std::span<const float> positions, const Cell& cell, cons
     double weight = Weight(positions.data() + 3 * row, cell, margin);
     if (own != cell.rows.end() && *own == row) {
       ++own;
-      weight = std::max(weight, 1e-3);  // outside the root cube by rounding, or alone in a cell without extent
+      weight = std::max(weight, 1e-3);  // for points rounded out of the root cube, or a cell without extent
     }
     block.weights.push_back(static_cast<float>(weight));
   }

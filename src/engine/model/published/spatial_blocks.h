@@ -7,24 +7,24 @@
 
 namespace anchorsplat {
 
-// A part of a cloud that is enhanced at once: the Gaussians of an octree cell, and those around it as context.
+// Gaussians enhanced together: those of an octree cell plus a margin of context around it.
 struct SpatialBlock {
-  std::vector<int64_t> rows;     // ascending; all Gaussians within the cell and its margin
-  std::vector<float> weights;    // [rows] share of this block in each Gaussian's result; over all blocks they sum to 1
-  std::array<double, 3> corner;  // of the cell with its margin, in the coordinates that were given
-  double side = 1;               // of the same
+  std::vector<int64_t> rows;     // Gaussians in the cell and its margin, ascending
+  std::vector<float> weights;    // [rows] blending weight of this block's result; sums to 1 over all blocks
+  std::array<double, 3> corner;  // lower corner of cell plus margin, in the coordinates of `positions`
+  double side = 1;               // side of cell plus margin, same unit
 };
 
 struct SpatialBlockOptions {
-  int64_t most = 200000;  // Gaussians of a cell, and of a margin
-  double margin = 0.125;  // context around a cell, in sides of the cell; at most 0.5
+  int64_t most = 200000;  // Gaussians per cell, and per margin
+  double margin = 0.125;  // width of the context around a cell, in cell sides; at most 0.5
 };
 
-// Splits `positions` [N,3] within the cube `corner`, `side` into octree cells of at most `most` Gaussians each; one
-// block for the whole cube, without margin, when that is enough. A margin that holds more than `most` is made narrower:
-// the nearest ones stay. Cells that hold more after 20 halvings (many Gaussians at one point) are cut by row instead.
-// Weights fall linearly from 1 to 0 over a strip as far within the cell's faces as the margin lies without, so that
-// blocks blend into each other. The order of the blocks is that of a depth-first walk.
+// Splits `positions` [N,3] in the cube (`corner`, `side`) into octree cells of at most `most` Gaussians, in depth-first
+// order. If the whole cube holds no more than that, returns it as one block without margin. A margin with more than
+// `most` Gaussians is narrowed to the nearest ones. Cells still too full after 20 halvings (many Gaussians at one
+// point) are cut by row. Neighbouring blocks blend: weights fall linearly from 1 to 0 across each face, reaching as far
+// into the cell as the margin reaches out.
 std::vector<SpatialBlock> SplitIntoBlocks(std::span<const float> positions, const std::array<double, 3>& corner,
                                           double side, const SpatialBlockOptions& options = {});
 

@@ -7,7 +7,7 @@
 
 namespace anchorsplat {
 
-// A tensor of a network's file.
+// Name and shape of a tensor in a weights file.
 struct TensorSpec {
   std::string name;
   std::vector<int64_t> shape;

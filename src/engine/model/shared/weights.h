@@ -9,13 +9,12 @@
 
 namespace anchorsplat {
 
-// Where a network takes its weights from: fills `values` (as many as the shape says) with the tensor's row-major
-// numbers. Counters are not asked for.
+// Source of a network's weights: fills `values` with the tensor's row-major numbers. Not called for counters.
 using WeightSource = std::function<Status(const TensorSpec& tensor, std::span<float> values)>;
 
-// Numbers made from the tensors' names, the same on every machine: parity tests and measurements need weights of a
-// realistic size that need not be stored. Element i of tensor `name` is u = splitmix64(FNV-1a(name) + (i + 1)·golden
-// ratio), its top 24 bits mapped to [−1, 1), scaled by the kind of tensor.
+// Deterministic weights of realistic size derived from tensor names, for parity tests and measurements. Element i of
+// tensor `name` is u = splitmix64(FNV-1a(name) + (i + 1)·golden ratio), its top 24 bits mapped to [−1, 1) and scaled by
+// the kind of tensor.
 WeightSource HashWeights();
 
 }  // namespace anchorsplat

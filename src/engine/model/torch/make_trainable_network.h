@@ -9,8 +9,8 @@
 
 namespace anchorsplat {
 
-// A network of the given kind with fresh parameters (torch's generator): "anchorsplat" or "compact".
-// Errors (kBadArgument): an unknown kind; an option that the kind does not have or of another type.
+// Makes a network of kind "anchorsplat" or "compact" with fresh parameters (torch's generator).
+// Errors (kBadArgument): an unknown kind; an option that the kind lacks or of the wrong type.
 Result<std::shared_ptr<TrainableNetwork>> MakeTrainableNetwork(const std::string& kind, const NetworkOptions& options);
 
 }  // namespace anchorsplat

@@ -17,7 +17,7 @@ size_t TensorsOf(const LpipsStep& step) {
   return step.kind == Kind::kMaxPool ? 0 : step.kind == Kind::kConvolution ? 2 : 6;
 }
 
-// The norm as a function of its own: its gradient at 0 is 0, where that of a square root is infinite.
+// Normalisation with gradient 0 at 0, where that of a square root would be infinite.
 at::Tensor UnitLength(const at::Tensor& x) {
   return x / (at::linalg_vector_norm(x, 2, {1}, /*keepdim=*/true) + kEpsilon);
 }
@@ -49,7 +49,7 @@ void LpipsNetwork::To(const at::TensorOptions& options) {
   for (at::Tensor& tensor : tensors_) tensor = tensor.to(options);
 }
 
-// To [−1, 1], then what the classifiers were trained on: ImageNet's means and deviations on that scale, as published.
+// Scales to [−1, 1], then normalises by ImageNet's mean and deviation on that scale, as published.
 at::Tensor LpipsNetwork::Prepare(const at::Tensor& x) const {
   const auto channel = [&](double r, double g, double b) {
     return at::tensor({r, g, b}, at::kDouble).to(tensors_[0].options()).view({1, 3, 1, 1});

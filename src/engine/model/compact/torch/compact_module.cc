@@ -41,7 +41,7 @@ torch::nn::LayerNorm CompactLayerNorm(int64_t channels) {
   return torch::nn::LayerNorm(torch::nn::LayerNormOptions({channels}).eps(kLayerNormEpsilon));
 }
 
-// a ⊗ b of quaternions [K,N,4], [N,4]; a's first component is 1, `vector` [K,N,3] the others.
+// Quaternion product a ⊗ b, with a = (1, `vector`) [K,N,·] and b = `q` [N,4].
 Tensor Turn(const Tensor& vector, const Tensor& q) {
   const Tensor x = vector.select(2, 0), y = vector.select(2, 1), z = vector.select(2, 2);
   const Tensor w = q.select(1, 0), a = q.select(1, 1), b = q.select(1, 2), c = q.select(1, 3);
@@ -82,7 +82,7 @@ CompactTrainable::CompactTrainable(const CompactConfig& config)
   for (const CompactAttribute& attribute : CopyAttributes(config)) {
     out_.push_back(out->register_module(attribute.name, torch::nn::Linear(g, config.copies * attribute.channels)));
   }
-  // Training begins at the filter.
+  // Training starts from the filter's output.
   const torch::NoGradGuard no_gradient;
   for (Tensor& parameter : out->parameters()) parameter.zero_();
   low_ = domain->register_buffer("low", torch::full({NodeFeatures(config)}, kNoLimit));
@@ -156,10 +156,10 @@ GaussianTensors CompactTrainable::Forward(const NetworkInput& input) {
       config_.epsilon * (config_.offset_unit == OffsetUnit::kScale   ? scale
                          : config_.offset_unit == OffsetUnit::kPixel ? tables.log_pixel.exp()
                                                                      : torch::full_like(scale, tables.offset_side));
-  // From the frames to the world, [K,N,3].
+  // Frame to world coordinates, [K,N,3].
   const auto to_world = [&](const Tensor& v) { return (v.unsqueeze(3) * tables.axes).sum(2); };
 
-  // All copies at once: tables are [K,N,·], which is the order of the rows.
+  // All copies at once, [K,N,·], in row order.
   const GaussianTensors& all = input.gaussians;
   const Tensor anchor_means = all.means.narrow(0, 0, n), anchor_sh = all.sh.narrow(0, 0, n);
   const int64_t coefficients = anchor_sh.size(1);
@@ -284,7 +284,7 @@ Status CompactTrainable::InitialiseFrom(const std::filesystem::path& path) {
     const bool reads_nodes = item.key() == "embed.first.weight" || item.key() == "head.first.weight";
     const int64_t unheard = NodeFeatures(config_) - NodeFeatures(config);
     if (reads_nodes && unheard > 0) given = torch::constant_pad_nd(given, {0, unheard});
-    // Of features that are new nobody knows the range yet.
+    // New features have no known range yet.
     if (item.key() == "domain.low" && unheard > 0) given = torch::constant_pad_nd(given, {0, unheard}, kNoLimit);
     if (item.key() == "domain.high" && unheard > 0) given = torch::constant_pad_nd(given, {0, unheard}, -kNoLimit);
     if (given.sizes().vec() != shape) continue;

@@ -16,23 +16,23 @@
 
 namespace anchorsplat {
 
-// A compact network (model/compact/compact_config.h) with gradients. Neighbours, frames and features are those of
-// inference, made once per splat by Prepare; they do not depend on parameters.
+// A compact network (model/compact/compact_config.h) for training. Prepare computes neighbours, frames and features
+// once per splat with inference's code; they do not depend on parameters.
 class CompactTrainable : public TrainableNetwork {
  public:
   explicit CompactTrainable(const CompactConfig& config);  // must be valid
 
-  // The splat is read on the CPU and its features are put where it lies. Errors (kBadArgument): no Gaussians; values
-  // that are not finite (log-scales and opacity logits of −Inf are fine); pixel sizes that are not positive.
+  // Computes features on the CPU and moves them to the splat's device. Errors (kBadArgument): no Gaussians; non-finite
+  // values (except −Inf log-scales and opacity logits); pixel sizes that are not positive.
   Result<std::shared_ptr<void>> Prepare(const NetworkInput& input) override;
 
-  // Parts know the neighbours that Gaussians have in the whole splat; what is remembered of the range of features is
-  // that of the splat as it was surveyed. Errors, besides those of Prepare: offsets in units of the whole splat's cube.
+  // Parts keep the neighbours of the whole splat and record its feature range as surveyed. Errors besides those of
+  // Prepare: OffsetUnit::kCube, which needs the whole splat.
   Result<std::shared_ptr<const void>> Survey(const NetworkInput& whole) override;
   SplatPart PartOf(const std::shared_ptr<const void>& survey, std::span<const int64_t> wanted) override;
 
-  // While training, the range of the features is remembered with every splat (buffers "domain.low" and "domain.high"):
-  // of each feature the 0.5 % and 99.5 % quantiles of the splat that went farthest.
+  // In training, also widens the recorded feature range (buffers "domain.low" and "domain.high"): per feature, the
+  // most extreme 0.5 % and 99.5 % quantiles of any splat.
   GaussianTensors Forward(const NetworkInput& input) override;
 
   void ShareMemory(const std::function<void(torch::Tensor&)>& maximum) override;
@@ -43,19 +43,18 @@ class CompactTrainable : public TrainableNetwork {
 
   const CompactConfig& config() const { return config_; }
 
-  // Raw outputs [N, CompactOutputs(config())], or of a part's wanted Gaussians, in the order of
+  // Raw outputs [N, CompactOutputs(config())], for a part those of its wanted Gaussians. Order as
   // CompactNetwork::Outputs.
   torch::Tensor Outputs(const NetworkInput& input);
 
-  // Fills parameters and buffers. Errors are those of `source`.
+  // Sets parameters and buffers. Errors: those of `source`.
   Status SetWeights(const WeightSource& source);
-  // Parameters and buffers as they are now or later, for CompactNetwork::Load. Shares them.
+  // Source of the live parameters and buffers, for CompactNetwork::Load. Shares ownership.
   WeightSource Weights();
 
-  // Begins with another network's weights and with the range of its training data: tensors of the same name and shape,
-  // output layers of another number of copies, all of which then begin as its first, and layers that were told less,
-  // to which what is new says nothing yet. Errors: of reading the file;
-  // kBadFile when it is no compact network or nothing of it fits.
+  // Starts from another network's weights and feature range. Copies tensors of equal name and shape. Output layers for
+  // another number of copies start as that network's first copy; layers with fewer inputs are extended by zero weights.
+  // Errors: those of reading the file; kBadFile if it is no compact network or nothing fits.
   Status InitialiseFrom(const std::filesystem::path& path);
 
  private:
@@ -71,7 +70,7 @@ class CompactTrainable : public TrainableNetwork {
   torch::nn::LayerNorm embed_norm_{nullptr};
   std::vector<Round> rounds_;
   torch::nn::Linear out_strength_{nullptr};
-  std::vector<torch::nn::Linear> out_;  // as CopyAttributes
+  std::vector<torch::nn::Linear> out_;  // in the order of CopyAttributes
   torch::Tensor low_, high_;
 };
 

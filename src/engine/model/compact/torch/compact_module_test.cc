@@ -99,7 +99,7 @@ TEST(CompactModule, InferenceIsTheSameFunction) {
       const auto result =
           packed->Apply(cloud, {.pixel_sizes = {&pixel, 1}, .upscale = 4, .strength = DefaultFilterStrength(4)});
       ASSERT_TRUE(result.ok()) << result.error().message;
-      EXPECT_EQ(result->outside, 0);
+      EXPECT_EQ(result->unlike_training, 0);
       if (!config.prior) {  // −Inf, which has no difference
         for (GaussianCloud* c : {const_cast<GaussianCloud*>(&expected), const_cast<GaussianCloud*>(&result->cloud)}) {
           for (float& s : c->log_scales) s = std::max(s, -100.0f);
@@ -169,7 +169,7 @@ TEST(CompactModule, LearnsOfTheKindLater) {
   ExpectNear(ToCloud(Copies(after, input)), ToCloud(Copies(before, input)), 1e-6);
   const auto packed = CompactNetwork::Load(config, after.Weights());
   ASSERT_TRUE(packed.ok()) << packed.error().message;
-  EXPECT_FALSE(packed->KnowsItsDomain());
+  EXPECT_FALSE(packed->HasTrainingRange());
 }
 
 TEST(CompactModule, BeginsAtTheFilter) {
@@ -393,7 +393,7 @@ TEST(CompactModule, SavesWhatInferenceOpens) {
   const float pixel = kSheetPixel;
   const auto result = opened->Apply(SheetCloud(300), {.pixel_sizes = {&pixel, 1}, .upscale = 4, .strength = 0.7});
   ASSERT_TRUE(result.ok());
-  EXPECT_EQ(result->outside, 0) << "it was trained on this very splat";
+  EXPECT_EQ(result->unlike_training, 0) << "it was trained on this very splat";
 
   // Twice as many copies begin as these.
   auto more = MakeCompactTrainable({{"copies", 4.0}, {"hidden", 32.0}, {"init", file.string()}});

@@ -25,18 +25,18 @@ FeatureRange RangeOf(const Tensor& nodes) {
   return {sorted[rank].clone(), sorted[n - 1 - rank].clone()};
 }
 
-// What Survey makes of a whole splat.
+// Result of Survey: the whole splat's neighbours.
 struct Surveyed {
   int64_t neighbours = 0;  // m
   Buffer<int32_t> index;   // [N,m]
   FeatureRange range;
 };
 
-// Of a part. Its rows are in rings: the wanted ones, their neighbours, the neighbours of those and so on.
+// Tables of a part. Its rows form rings: the wanted ones, their neighbours, those neighbours' neighbours, …
 struct PartTables {
-  std::vector<int64_t> rings;  // rows up to the end of each ring; rounds + 2 of them
+  std::vector<int64_t> rings;  // number of rows up to the end of each ring; rounds + 2 entries
   int64_t neighbours = 0;      // m
-  Buffer<int32_t> index;       // [rows,m] rows of the part; those of the last ring have themselves
+  Buffer<int32_t> index;       // [rows,m] neighbours as rows of the part; rows of the last ring refer to themselves
   FeatureRange range;
 };
 
@@ -49,7 +49,7 @@ void CopyTo(const Tensor& tensor, Buffer<float>& out) {
   out.assign(own.const_data_ptr<float>(), own.const_data_ptr<float>() + own.numel());
 }
 
-// A splat that a network can work with, and p_LR of each of its Gaussians.
+// A splat checked to be usable, with p_LR per Gaussian.
 struct UsableSplat {
   GaussianCloud cloud;
   Buffer<float> pixel_sizes;
@@ -81,7 +81,7 @@ CompactFeatures::Task FeatureTask(const CompactConfig& config, const NetworkInpu
           .node_features = NodeFeatures(config)};
 }
 
-// ±1, the sign of each frame's determinant.
+// ±1: the determinant of each frame.
 Tensor Handedness(const CompactGraph& graph, int64_t n) {
   Tensor signs = torch::empty({n, 1});
   float* sign = signs.data_ptr<float>();
@@ -128,7 +128,7 @@ SplatPart PartOfSplat(const CompactConfig& config, const std::shared_ptr<const v
   SplatPart part;
   part.rows.assign(wanted.begin(), wanted.end());
   part.wanted = static_cast<int64_t>(wanted.size());
-  std::vector<int32_t> place(m > 0 ? surveyed.index.size() / static_cast<size_t>(m) : 1, -1);  // in the part
+  std::vector<int32_t> place(m > 0 ? surveyed.index.size() / static_cast<size_t>(m) : 1, -1);  // row in the part
   for (size_t i = 0; i < wanted.size(); ++i) place[static_cast<size_t>(wanted[i])] = static_cast<int32_t>(i);
   tables->rings.push_back(part.wanted);
   for (int64_t ring = 0, begin = 0; ring <= config.rounds; ++ring) {

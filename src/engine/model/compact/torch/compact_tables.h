@@ -15,19 +15,19 @@
 
 namespace anchorsplat {
 
-// What the features of a splat range over: quantiles of each, [NodeFeatures(config)].
+// Range of a splat's features: quantiles of each, [NodeFeatures(config)].
 struct FeatureRange {
   torch::Tensor low, high;
 };
 
-// What Prepare makes of a splat or a part of it. Round r leaves states of the first rings[rounds − r] rows: after the
-// last one, of those whose copies are wanted. Of a whole splat all rings end at N.
+// What Prepare computes for a splat or a part. Round r updates the first rings[rounds − r] rows, so the last round
+// leaves states of the wanted rows. For a whole splat all rings end at N.
 struct CompactTables {
   std::vector<int64_t> rings;
   torch::Tensor nodes;            // [rings[rounds],NodeFeatures(config)]
   torch::Tensor edges;            // [rings[rounds − 1]·m,kEdgeFeatures]
-  std::vector<EdgeIndex> rounds;  // of each round's edges
-  // Of the wanted rows, N from here on.
+  std::vector<EdgeIndex> rounds;  // edges of each round
+  // From here on N counts the wanted rows.
   torch::Tensor axes;         // [N,3,3] axis a is row a
   torch::Tensor handedness;   // [N,1] ±1
   torch::Tensor stored_axis;  // [N,3] int64
@@ -37,13 +37,13 @@ struct CompactTables {
   torch::Tensor start_logit;  // [N]
   torch::Tensor log_shorter;  // [N,3] longest first
   FeatureRange range;
-  double offset_side = 0;  // of OffsetUnit::kCube
+  double offset_side = 0;  // side of the cube for OffsetUnit::kCube, world units
 };
 
-// f of the filter that residuals are added to.
+// f of the filter under the residuals.
 double StrengthOf(const NetworkInput& input);
 
-// Errors: those of CompactTrainable's methods, which these are.
+// Implement the methods of CompactTrainable; same errors.
 Result<std::shared_ptr<CompactTables>> MakeCompactTables(const CompactConfig& config, const CopyStart& start,
                                                          const NetworkInput& input);
 Result<std::shared_ptr<const void>> SurveySplat(const CompactConfig& config, const NetworkInput& whole);

@@ -8,7 +8,7 @@
 
 namespace anchorsplat {
 
-// A compact network for training. Options are those of VisitCompactOptions, and `init`: a file for InitialiseFrom.
+// Makes a compact network for training. Options: those of VisitCompactOptions, and `init`, a file for InitialiseFrom.
 // Errors: those of MakeTrainableNetwork (model/torch/make_trainable_network.h).
 Result<std::shared_ptr<TrainableNetwork>> MakeCompactTrainable(NetworkOptions options);
 

@@ -12,10 +12,10 @@ namespace {
 
 using torch::Tensor;
 
-// With 8 neighbours and 64 channels the tables of a block's edges are half a megabyte each.
+// With 8 neighbours and 64 channels a block's edge tables take half a megabyte each.
 constexpr int64_t kPointsPerBlock = 256;
 
-// A range of points and what belongs to it, as views.
+// Views on a range of points and its tables.
 struct EdgeBlock {
   int64_t begin, points, m;
 
@@ -43,8 +43,8 @@ Tensor Sums(const EdgeBlock& block, const Tensor& own, const Tensor& other, cons
   return sums;
 }
 
-// Maximum and where it is (the first of several), and mean, of the messages [points·m,H]. By hand: torch's maximum with
-// its place takes longer than the matrix products.
+// Maximum, argmax (the first of several) and mean of the messages [points·m,H]. By hand: torch's max with indices takes
+// longer than the matrix products.
 void Pool(const Tensor& messages, const Tensor& pooled, const Tensor& where) {
   const int64_t points = pooled.size(0), h = messages.size(1), m = messages.size(0) / points;
   const float* message = messages.const_data_ptr<float>();
@@ -68,7 +68,7 @@ void Pool(const Tensor& messages, const Tensor& pooled, const Tensor& where) {
   }
 }
 
-// The way back: ∂/∂pooled to ∂/∂messages.
+// Backward of Pool: ∂/∂pooled to ∂/∂messages.
 void Unpool(const Tensor& of_pooled, const Tensor& where, const Tensor& of_messages) {
   const int64_t points = of_pooled.size(0), h = where.size(1), m = of_messages.size(0) / points;
   const float* maximum = of_pooled.const_data_ptr<float>();
@@ -126,7 +126,7 @@ class PooledMessagesFunction : public torch::autograd::Function<PooledMessagesFu
       block.Edges(to_sums).copy_(of_sums);
     });
 
-    // What reaches a point from the edges that read it. By the points, so that no two threads write to one row.
+    // Gradient from the edges that read each point. Looped by point, so that no two threads write the same row.
     const Tensor to_other = torch::zeros_like(other);
     const float* from = to_sums.const_data_ptr<float>();
     const int64_t* edge = incoming.const_data_ptr<int64_t>();
@@ -189,7 +189,7 @@ Tensor PooledMessagesPlain(const Tensor& own, const Tensor& other, const Tensor&
 
 Tensor PooledMessages(const Tensor& own, const Tensor& other, const Tensor& edges, const EdgeIndex& index,
                       const Tensor& edge_weight, const Tensor& message_weight, const Tensor& message_bias) {
-  // Only the plain form knows other devices and number types.
+  // Other devices and number types use the plain form.
   if (index.neighbours == 0 || own.device() != torch::kCPU || own.scalar_type() != torch::kFloat32) {
     return PooledMessagesPlain(own, other, edges, index, edge_weight, message_weight, message_bias);
   }

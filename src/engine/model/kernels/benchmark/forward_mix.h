@@ -8,7 +8,7 @@
 
 namespace anchorsplat {
 
-// One kind of block of the U-Net and how many of them a forward pass runs.
+// One block shape of the U-Net and how many a forward pass runs.
 struct BlockMix {
   int level;
   int64_t channels;
@@ -21,8 +21,8 @@ inline constexpr BlockMix kForwardMix[] = {{0, 64, 2, 2},   {1, 96, 4, 2},   {2,
                                            {3, 256, 16, 6}, {4, 512, 32, 2}, {0, 96, 4, 2},
                                            {1, 96, 4, 2},   {2, 128, 8, 2},  {3, 256, 16, 2}};
 
-// Voxels [N,3] of a closed surface whose hierarchy resembles that of a fitted object: most of its points have a voxel
-// of their own, and three poolings leave about a sixth of them.
+// Voxels [N,3] of a closed surface with a hierarchy like a fitted object's: most points have their own voxel, and three
+// poolings leave about a sixth of them.
 std::vector<int32_t> SurfaceVoxels(int64_t count);
 
 }  // namespace anchorsplat

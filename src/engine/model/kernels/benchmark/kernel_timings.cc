@@ -24,7 +24,7 @@ Buffer<float> RandomFloats(int64_t count, double size) {
   return values;
 }
 
-// Times work of one kind and keeps an eye on what the machine can do meanwhile: other programs come and go.
+// Times one kind of work and measures the machine's peak alongside: other programs may slow both.
 class BestOf {
  public:
   explicit BestOf(int repeats) : repeats_(repeats) {}
@@ -106,7 +106,7 @@ KernelTimings TimeKernels(const std::vector<int32_t>& voxels, int repeats) {
       int64_t inputs, outputs;
       Activation activation;
     };
-    // After the convolution and behind the attention, q k v, and the two layers of the perceptron.
+    // Linear layers: after the convolution and after attention; q k v; the two of the MLP.
     const Shape shapes[] = {{c, c, Activation::kNone},
                             {c, c, Activation::kNone},
                             {c, 3 * c, Activation::kNone},

@@ -6,12 +6,12 @@
 
 namespace anchorsplat {
 
-// The best of several runs of one kernel on the work of a whole forward pass.
+// Best time of one kernel over several runs, on the work of a whole forward pass.
 struct KernelTiming {
   std::string name;
   double seconds = 0;
   double operations = 0;  // multiplications and additions of its matrix products
-  double of_peak = 0;     // operations per second over the machine's best in the same minutes
+  double of_peak = 0;     // operations per second relative to the machine's peak, measured in the same minutes
 };
 
 struct KernelTimings {
@@ -19,8 +19,8 @@ struct KernelTimings {
   std::vector<KernelTiming> kernels;
 };
 
-// Attention, convolutions and linear layers of a forward pass over a cloud at voxels [N,3], `repeats` times each, kind
-// by kind of block; the best of each kind is summed.
+// Times attention, convolutions and linear layers of a forward pass over voxels [N,3]. Runs each kernel `repeats` times
+// per block shape and sums the best times.
 KernelTimings TimeKernels(const std::vector<int32_t>& voxels, int repeats);
 
 }  // namespace anchorsplat

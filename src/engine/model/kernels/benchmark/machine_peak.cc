@@ -18,7 +18,7 @@ namespace anchorsplat {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Returns the operations of `rounds` rounds; the sums go to `sink` so that they are not optimised away.
+// Returns the operations of `rounds` rounds. Writes the sums to `sink` so that they are not optimised away.
 double MultiplyAdds(int64_t rounds, float* sink) {
   const hn::CappedTag<float, 16> d;
   constexpr int kSums = 12;  // enough to hide the latency of each

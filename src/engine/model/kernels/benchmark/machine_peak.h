@@ -2,8 +2,8 @@
 
 namespace anchorsplat {
 
-// Floating-point operations per second of nothing but fused multiply-adds on registers, in fp32 on all threads that
-// ParallelFor uses, over about `seconds`. What no kernel can exceed.
+// Peak fp32 FLOP/s: fused multiply-adds on registers on all ParallelFor threads for about `seconds`. The upper bound of
+// every kernel.
 double MeasurePeakFlops(double seconds);
 
 }  // namespace anchorsplat

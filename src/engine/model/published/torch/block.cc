@@ -31,7 +31,7 @@ BlockImpl::BlockImpl(int64_t channels, int64_t heads, double drop_path)
       norm2(LayerNormOf(channels)),
       mlp(channels, 4 * channels),
       drop_path_(drop_path) {
-  // The lists only give the parameters the names they have in published checkpoints: cpe.0, norm1.0, …
+  // These lists only name the parameters as in published checkpoints: cpe.0, norm1.0, …
   register_module("cpe", torch::nn::ModuleList(conv, cpe_linear, cpe_norm));
   register_module("norm1", torch::nn::ModuleList(norm1));
   register_module("attn", attention);

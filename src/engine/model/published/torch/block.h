@@ -10,8 +10,8 @@
 
 namespace anchorsplat {
 
-// Stochastic depth: while training, each row of x is zero with probability `rate`, the others are scaled by
-// 1/(1 − rate), so that the expectation stays.
+// Stochastic depth: in training, zeroes each row with probability `rate` and scales the others by 1/(1 − rate) to keep
+// the expectation.
 torch::Tensor DropPath(const torch::Tensor& x, double rate, bool training);
 
 class MlpImpl : public torch::nn::Module {
@@ -23,13 +23,13 @@ class MlpImpl : public torch::nn::Module {
 };
 TORCH_MODULE(Mlp);
 
-// PTv3's pre-norm block: x += LN(Linear(conv(conv_in))) as conditional positional encoding, then attention and MLP,
-// each behind a LayerNorm and on the residual path.
+// Pre-norm block of PTv3: x += LN(Linear(conv(conv_in))) as conditional positional encoding, then attention and MLP as
+// residual branches, each behind a LayerNorm.
 class BlockImpl : public torch::nn::Module {
  public:
   BlockImpl(int64_t channels, int64_t heads, double drop_path);
 
-  // `name` is for options.tap. `conv_in` is x, except in the first block of a decoder stage (see SerializedUnpooling).
+  // `name`: prefix for options.tap. `conv_in`: x, except in a decoder stage's first block (see SerializedUnpooling).
   torch::Tensor forward(torch::Tensor x, const torch::Tensor& conv_in, const LevelTensors& level, int slot,
                         const ForwardOptions& options, const std::string& name);
 

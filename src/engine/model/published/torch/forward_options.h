@@ -7,12 +7,11 @@
 
 namespace anchorsplat {
 
-// To what queries, keys, values and the attention's result are rounded. The published network runs flash attention on
-// fp16 (PTv3's newer releases: bf16) and everything else in fp32.
+// Rounding of queries, keys, values and attention output. The published network runs flash attention in fp16 (newer
+// PTv3 releases: bf16) and everything else in fp32.
 enum class AttentionRounding { kFp32, kFp16, kBf16 };
 
-// Called with intermediate results ("embedding", "enc0.block0.cpe", "enc0.block0.attn", …, "enc0", …, "dec0") where
-// somebody wants to see them.
+// Receives intermediate results: "embedding", "enc0.block0.cpe", "enc0.block0.attn", …, "enc0", …, "dec0".
 using StageTap = std::function<void(const std::string& stage, const torch::Tensor& value)>;
 
 struct ForwardOptions {

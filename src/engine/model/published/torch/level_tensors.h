@@ -10,8 +10,7 @@
 
 namespace anchorsplat {
 
-// One level of a cloud as the network's modules use it: the tables of Level as tensors on the network's device. On the
-// CPU they share the tables' memory.
+// The tables of a Level as tensors on the network's device. On the CPU they share its memory.
 struct LevelTensors {
   std::shared_ptr<const Level> tables;
   int64_t count = 0;
@@ -19,9 +18,9 @@ struct LevelTensors {
   std::array<torch::Tensor, kCurves> patch_rows;  // int32 [PaddedCount(N)]
   std::array<torch::Tensor, kCurves> positions;   // int32 [N]
   torch::Tensor neighbours;                       // int32 [N,27]
-  torch::Tensor cluster;                          // int64 [N], undefined in the coarsest level
+  torch::Tensor cluster;                          // int64 [N], undefined at the coarsest level
 
-  // Rows that offset k of the 3×3×3 convolution writes (out) and reads (in), both int32 [pairs]; made on first use.
+  // Rows that each offset of the 3×3×3 convolution writes (out) and reads (in), int32 [pairs]. Built on first use.
   struct Pairs {
     torch::Tensor out, in;
   };

@@ -10,8 +10,8 @@ struct Sum : torch::CustomClassHolder {
   SumOverProcesses over;
 };
 
-// A loss is the sum of all processes' losses, so what flows back to a process's share of a sum is the sum of what flows
-// back to that sum everywhere.
+// The loss is summed over all processes, so the gradient of a process's summand is the sum of all processes' gradients
+// of the sum.
 class SumFunction : public torch::autograd::Function<SumFunction> {
  public:
   static torch::Tensor forward(torch::autograd::AutogradContext* context, const torch::Tensor& share,

@@ -10,7 +10,7 @@ namespace anchorsplat {
 
 namespace {
 
-// Linear from 0 to `last` over `count` blocks.
+// `count` rates rising linearly from 0 to `last`.
 std::vector<double> DropPathRates(double last, int64_t count) {
   std::vector<double> rates(static_cast<size_t>(count));
   for (size_t i = 0; i < rates.size(); ++i) {
@@ -46,7 +46,7 @@ PointTransformerV3Impl::PointTransformerV3Impl(const PublishedConfig& config)
     encoder.push_back(std::move(stage));
   }
 
-  // The decoder's rates are spread over its stages finest first, and fall within each.
+  // Decoder rates are assigned to stages finest first, and fall within each stage.
   const std::vector<double> decoder_rates = DropPathRates(config.drop_path, total(config.decoder_blocks));
   Group dec = register_module("dec", Group());
   decoder.resize(stages - 1);

@@ -10,7 +10,7 @@
 
 namespace anchorsplat {
 
-// Point Transformer V3 (Wu et al., CVPR 2024) as a U-Net over the levels of a cloud.
+// Point Transformer V3 (Wu et al., CVPR 2024): a U-Net over the levels of a cloud.
 class PointTransformerV3Impl : public torch::nn::Module {
  public:
   explicit PointTransformerV3Impl(const PublishedConfig& config);

@@ -7,7 +7,7 @@
 
 namespace anchorsplat {
 
-// Fine to coarse: Linear on every point, maximum over each cluster, then BatchNorm and GELU.
+// Pools fine to coarse: Linear per point, maximum per cluster, BatchNorm, GELU.
 class SerializedPoolingImpl : public torch::nn::Module {
  public:
   SerializedPoolingImpl(int64_t in, int64_t out);
@@ -18,11 +18,11 @@ class SerializedPoolingImpl : public torch::nn::Module {
 };
 TORCH_MODULE(SerializedPooling);
 
-// Coarse to fine: both sides through Linear, BatchNorm and GELU, then skip + up[cluster].
+// Unpools coarse to fine: Linear, BatchNorm and GELU on both inputs, then skip + up[cluster].
 //
-// PTv3's first release writes the skip branch into the sparse tensor before the addition and never updates it, so the
-// convolution of the decoder stage's first block reads `skip` alone while the residual stream is the sum. Published
-// weights were trained that way.
+// Returns `skip` too: in PTv3's first release the convolution of a decoder stage's first block reads the skip branch
+// alone, because the sparse tensor is filled before the addition and never updated. Published weights were trained that
+// way.
 class SerializedUnpoolingImpl : public torch::nn::Module {
  public:
   SerializedUnpoolingImpl(int64_t coarse, int64_t skip, int64_t out);

@@ -9,7 +9,7 @@ namespace anchorsplat {
 
 namespace {
 
-// A module that only holds others or parameters, to give them their names.
+// An empty module that only names its submodules and parameters.
 class HeadGroupImpl : public torch::nn::Module {};
 TORCH_MODULE(HeadGroup);
 
@@ -30,7 +30,7 @@ GaussianHeadsImpl::GaussianHeadsImpl(int64_t channels, int64_t hidden, int64_t c
     const int64_t out = copies * kAttributes[a].channels;
     layers[a] = {torch::nn::Linear(channels + kFeatures, hidden), torch::nn::Linear(hidden, hidden),
                  torch::nn::Linear(hidden, hidden), torch::nn::Linear(hidden, out)};
-    // Training starts at the anchors themselves, told apart by the embeddings alone.
+    // Training starts from the anchors, distinguished by the embeddings alone.
     layers[a][3]->weight.zero_();
     layers[a][3]->bias.zero_();
     embeddings[a] = torch::randn({copies, kAttributes[a].channels}).mul_(0.01);
@@ -42,7 +42,7 @@ void GaussianHeadsImpl::RegisterIn(torch::nn::Module& network) {
   for (size_t a = 0; a < layers.size(); ++a) {
     const std::string name = kAttributes[a].name;
     HeadGroup mlp;
-    // Even indices: ReLUs stand between.
+    // Even indices: the odd ones are ReLUs.
     for (size_t i = 0; i < layers[a].size(); ++i) mlp->register_module(Cat(2 * i), layers[a][i]);
     mlps->register_module(name, mlp);
     embeddings[a] = points->register_parameter(name, embeddings[a]);

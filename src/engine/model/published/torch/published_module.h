@@ -13,16 +13,16 @@
 
 namespace anchorsplat {
 
-// One small MLP per attribute over [backbone output | input features], and an embedding per copy (AnchorSplat, §3.3).
-// Everything is a residual on the anchor in stored, normalised space: means + ε·tanh(·), the others + ·.
+// Heads of AnchorSplat (§3.3): per attribute a small MLP on [backbone output | input features], plus an embedding per
+// copy. Outputs are residuals on the anchor in stored, normalised space: means + ε·tanh(·), others + ·.
 class GaussianHeadsImpl : public torch::nn::Module {
  public:
   GaussianHeadsImpl(int64_t channels, int64_t hidden, int64_t copies);
 
-  // Parameters are registered in the network itself, because checkpoints have them at its root.
+  // Registers the parameters at the network's root, where checkpoints have them.
   void RegisterIn(torch::nn::Module& network);
 
-  // context [n,channels], features [n,59] → [K,n,59]: copy k of all anchors before copy k + 1.
+  // context [n,channels], features [n,59] → [K,n,59]; copy k of all anchors precedes copy k + 1.
   torch::Tensor forward(const torch::Tensor& context, const torch::Tensor& features);
 
   std::array<std::array<torch::nn::Linear, 4>, 6> layers = {{{nullptr, nullptr, nullptr, nullptr},
@@ -43,10 +43,10 @@ class AnchorSplatNetworkImpl : public torch::nn::Module {
  public:
   explicit AnchorSplatNetworkImpl(const PublishedConfig& config);  // must be valid
 
-  // features [N,59] of the normalised cloud (see kAttributes) → [K,N,59] in the same columns.
+  // features [N,59] of the normalised cloud (kAttributes) → [K,N,59], same columns.
   torch::Tensor forward(const torch::Tensor& features, const Hierarchy& hierarchy, const ForwardOptions& options = {});
 
-  // All parameters and buffers in the order and under the names of published checkpoints.
+  // All parameters and buffers, named and ordered as in published checkpoints.
   std::vector<std::pair<std::string, torch::Tensor>> StateDict();
 
   const PublishedConfig config;
@@ -55,10 +55,10 @@ class AnchorSplatNetworkImpl : public torch::nn::Module {
 };
 TORCH_MODULE(AnchorSplatNetwork);
 
-// Fills parameters and running statistics; counters become zero. Errors are those of `source`.
+// Sets parameters and running statistics; zeroes counters. Errors: those of `source`.
 Status SetWeights(AnchorSplatNetworkImpl& network, const WeightSource& source);
 
-// The network's parameters and running statistics as they are now or later, for PublishedNetwork::Load. Shares them.
+// Source of the network's live parameters and running statistics, for PublishedNetwork::Load. Shares ownership.
 WeightSource WeightsOf(AnchorSplatNetworkImpl& network);
 
 }  // namespace anchorsplat

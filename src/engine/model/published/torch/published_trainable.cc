@@ -24,7 +24,7 @@ struct Prepared {
   Hierarchy hierarchy;
 };
 
-// The published network (Point Transformer V3 with six heads) behind the training loop's interface.
+// The published network (Point Transformer V3 with six heads) as a TrainableNetwork.
 class AnchorSplatTrainable : public TrainableNetwork {
  public:
   AnchorSplatTrainable(const PublishedConfig& config, bool shuffle, AttentionRounding rounding)
@@ -56,13 +56,13 @@ Result<std::shared_ptr<void>> AnchorSplatTrainable::Prepare(const NetworkInput& 
   const torch::Tensor shift = torch::tensor({to_cube.shift[0], to_cube.shift[1], to_cube.shift[2]});
   torch::Tensor sh = g.sh.to(torch::kCPU);
   if (sh.size(1) < kCoefficients) sh = torch::cat({sh, torch::zeros({n, kCoefficients - sh.size(1), 3})}, 1);
-  // Rounding pushes an extreme Gaussian of some clouds just outside of the cube.
+  // Rounding pushes extreme Gaussians of some clouds just outside the cube.
   const torch::Tensor in_cube = (means * to_cube.scale + shift).clamp(0, 1);
   const torch::Tensor features =
       torch::cat({in_cube, g.log_scales.to(torch::kCPU) + to_cube.LogScale(),
                   g.opacity_logits.to(torch::kCPU).unsqueeze(1), g.quats.to(torch::kCPU), sh.flatten(1)},
                  1);
-  // A number that changes with any value of the splat and with nothing else: a resumed training draws the same orders.
+  // Seeded by the splat's values alone, so that a resumed training draws the same orders.
   Fingerprint print;
   print.AddWords(values);
   const Shuffles shuffles = shuffle_ ? ShufflesFromSeed(print.value()) : kNoShuffles;
@@ -106,7 +106,7 @@ Status AnchorSplatTrainable::Save(const std::filesystem::path& path,
                                   const std::map<std::string, std::string>& metadata) {
   std::map<std::string, std::string> all = metadata;
   for (const auto& [key, value] : ArchitectureMetadata(network_->config)) all[key] = value;
-  std::vector<torch::Tensor> kept;  // host copies, alive until they are written
+  std::vector<torch::Tensor> kept;  // host copies, kept until written
   std::vector<TensorEntry> entries;
   for (const auto& [name, tensor] : network_->StateDict()) {
     const bool counter = tensor.scalar_type() == torch::kInt64;
@@ -126,17 +126,17 @@ Result<std::shared_ptr<TrainableNetwork>> MakePublishedTrainable(const NetworkOp
   bool shuffle = true;
   std::string attention = "fp32";
   OptionReader reader(options);
-  reader.Whole("copies", 1, 256, config.copies);
-  reader.Wholes("encoder_channels", 1, 4096, config.encoder_channels);
-  reader.Wholes("encoder_blocks", 1, 64, config.encoder_blocks);
-  reader.Wholes("decoder_channels", 1, 4096, config.decoder_channels);
-  reader.Wholes("decoder_blocks", 1, 64, config.decoder_blocks);
-  reader.Whole("head_hidden", 1, 4096, config.head_hidden);
+  reader.Integer("copies", 1, 256, config.copies);
+  reader.Integers("encoder_channels", 1, 4096, config.encoder_channels);
+  reader.Integers("encoder_blocks", 1, 64, config.encoder_blocks);
+  reader.Integers("decoder_channels", 1, 4096, config.decoder_channels);
+  reader.Integers("decoder_blocks", 1, 64, config.decoder_blocks);
+  reader.Integer("head_hidden", 1, 4096, config.head_hidden);
   reader.Number("drop_path", 0, 0.99, config.drop_path);
   reader.Flag("shuffle_orders", shuffle);
   reader.Text("attention", {"fp32", "fp16", "bf16"}, attention);
   ANCHORSPLAT_RETURN_IF_ERROR(reader.Finish());
-  // Heads, strides and patches are the published ones: no tensor tells them, so no reader could know of others.
+  // Heads, strides and patch size stay as published: no tensor encodes them, so readers could not know others.
   const size_t stages = config.encoder_channels.size();
   if (stages >= 1 && stages <= config.encoder_heads.size()) {
     config.encoder_heads.resize(stages);

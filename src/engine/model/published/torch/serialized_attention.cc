@@ -35,7 +35,7 @@ torch::Tensor SerializedAttentionImpl::forward(const torch::Tensor& x, const Lev
   const auto parts = sequence.permute({2, 0, 3, 1, 4}).unbind(0);  // each [patches, heads, patch, head]
   torch::Tensor y = torch::scaled_dot_product_attention(parts[0], parts[1], parts[2]);
   y = Round(y, rounding).transpose(1, 2).reshape({patches * patch, channels});
-  // Back to the points' own order; what borrowed slots received is left behind.
+  // Back to point order; results of borrowed slots are dropped.
   return proj(y.index_select(0, level.positions[static_cast<size_t>(slot)]));
 }
 

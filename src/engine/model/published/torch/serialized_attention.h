@@ -7,13 +7,13 @@
 
 namespace anchorsplat {
 
-// Multi-head attention within patches of consecutive points along a curve (PTv3, §4.3), one row of x per point.
-// `qkv` gives [q | k | v], each with heads of C/H consecutive channels; scores are scaled by (C/H)^(−1/2).
+// Multi-head attention within patches of consecutive points along a curve (PTv3, §4.3). `qkv` yields [q | k | v]; head
+// h owns C/H consecutive channels of each. Scores are scaled by (C/H)^(−1/2).
 class SerializedAttentionImpl : public torch::nn::Module {
  public:
   SerializedAttentionImpl(int64_t channels, int64_t heads);
 
-  // `slot`: which of the level's four orders.
+  // x [N,C] → [N,C]. `slot`: which of the level's four orders.
   torch::Tensor forward(const torch::Tensor& x, const LevelTensors& level, int slot, AttentionRounding rounding);
 
   torch::nn::Linear qkv{nullptr}, proj{nullptr};

@@ -6,10 +6,9 @@
 
 namespace anchorsplat {
 
-// Submanifold 3×3×3 convolution (Graham et al. 2018): outputs exist where inputs do, absent voxels contribute nothing.
-// weight [out,3,3,3,in] and bias [out] as spconv stores them; offset (r0 − 1, r1 − 1, r2 − 1) along (x, y, z) has
-// weight
-// [:,r0,r1,r2,:]. Points that share a voxel: see VoxelNeighbours.
+// Submanifold 3×3×3 convolution (Graham et al. 2018): outputs exist where inputs do; absent voxels contribute nothing.
+// weight [out,3,3,3,in] and bias [out] as in spconv: weight[:,r0,r1,r2,:] applies to offset (r0 − 1, r1 − 1, r2 − 1)
+// along (x, y, z). For points that share a voxel see VoxelNeighbours.
 //
 // Initialised like spconv: Kaiming-uniform with a = √5 and fan_in = 27·in, bias uniform in ±1/√fan_in.
 class SubmanifoldConvolutionImpl : public torch::nn::Module {

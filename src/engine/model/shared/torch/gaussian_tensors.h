@@ -19,7 +19,7 @@ struct GaussianTensors {
   GaussianTensors To(torch::Device device) const;
 };
 
-// Copies; values stay as they are. Metadata of a cloud is not kept. `gaussians` must have the shapes above.
+// Copies values unchanged; drops metadata. `gaussians` must have the shapes above.
 GaussianTensors ToTensors(const GaussianCloud& cloud);
 GaussianCloud ToCloud(const GaussianTensors& gaussians);
 

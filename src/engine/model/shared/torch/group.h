@@ -4,7 +4,7 @@
 
 namespace anchorsplat {
 
-// A module that only holds others, to give them their names.
+// An empty module that only names its submodules.
 class GroupImpl : public torch::nn::Module {};
 TORCH_MODULE(Group);
 

@@ -11,8 +11,8 @@ namespace anchorsplat {
 
 namespace {
 
-std::optional<int64_t> AsWhole(double value, int64_t low, int64_t high) {
-  // Compared as doubles first: a conversion of what no integer holds is undefined.
+std::optional<int64_t> AsInteger(double value, int64_t low, int64_t high) {
+  // Compared as double first: converting an unrepresentable value is undefined.
   if (!(value >= static_cast<double>(low) && value <= static_cast<double>(high)) || value != std::floor(value)) {
     return std::nullopt;
   }
@@ -50,9 +50,9 @@ void OptionReader::Number(const std::string& key, double low, double high, doubl
   options_.erase(key);
 }
 
-void OptionReader::Whole(const std::string& key, int64_t low, int64_t high, int64_t& value) {
+void OptionReader::Integer(const std::string& key, int64_t low, int64_t high, int64_t& value) {
   if (const double* given = Take<double>(key, "a whole number")) {
-    if (const auto whole = AsWhole(*given, low, high)) {
+    if (const auto whole = AsInteger(*given, low, high)) {
       value = *whole;
     } else {
       Complain(key, Cat("a whole number from ", low, " to ", high));
@@ -61,9 +61,9 @@ void OptionReader::Whole(const std::string& key, int64_t low, int64_t high, int6
   options_.erase(key);
 }
 
-void OptionReader::Whole(const std::string& key, int64_t low, int64_t high, int& value) {
+void OptionReader::Integer(const std::string& key, int64_t low, int64_t high, int& value) {
   int64_t wide = value;
-  Whole(key, low, high, wide);
+  Integer(key, low, high, wide);
   value = static_cast<int>(wide);
 }
 
@@ -80,11 +80,11 @@ void OptionReader::Text(const std::string& key, const std::vector<std::string>& 
   options_.erase(key);
 }
 
-void OptionReader::Wholes(const std::string& key, int64_t low, int64_t high, std::vector<int64_t>& value) {
+void OptionReader::Integers(const std::string& key, int64_t low, int64_t high, std::vector<int64_t>& value) {
   if (const auto* given = Take<std::vector<double>>(key, "a list of whole numbers")) {
     std::vector<int64_t> list;
     for (const double number : *given) {
-      const auto whole = AsWhole(number, low, high);
+      const auto whole = AsInteger(number, low, high);
       if (!whole) {
         Complain(key, Cat("a list of whole numbers from ", low, " to ", high));
         break;

@@ -12,11 +12,11 @@ TEST(OptionReader, TakesWhatIsGivenAndLeavesDefaults) {
   double rate = 0.25;
   std::vector<int64_t> widths;
   std::string unit = "scale";
-  reader.Whole("copies", 1, 64, copies);
-  reader.Whole("depth", 1, 64, depth);
+  reader.Integer("copies", 1, 64, copies);
+  reader.Integer("depth", 1, 64, depth);
   reader.Flag("prior", prior);
   reader.Number("rate", 0, 1, rate);
-  reader.Wholes("widths", 1, 100, widths);
+  reader.Integers("widths", 1, 100, widths);
   reader.Text("unit", {"scale", "cube"}, unit);
   EXPECT_TRUE(reader.Finish().ok());
   EXPECT_EQ(copies, 4);
@@ -33,8 +33,8 @@ TEST(OptionReader, ComplainsByName) {
     int copies = 1;
     std::vector<int64_t> widths;
     std::string unit;
-    reader.Whole("copies", 1, 64, copies);
-    reader.Wholes("widths", 1, 100, widths);
+    reader.Integer("copies", 1, 64, copies);
+    reader.Integers("widths", 1, 100, widths);
     reader.Text("unit", {"scale", "cube"}, unit);
     const Status status = reader.Finish();
     return status.ok() ? std::string("none") : status.error().message;

@@ -12,7 +12,7 @@ namespace anchorsplat {
 
 namespace {
 
-// What one view needs from its rendering to its gradient.
+// State of one view from rendering to gradient.
 struct Slot {
   Rasterizer rasterizer;
   RenderOutput output;
@@ -23,7 +23,7 @@ struct Slot {
 
 }  // namespace
 
-// Slots that no graph uses.
+// Slots not used by any graph.
 struct RenderOp::Pool : std::enable_shared_from_this<RenderOp::Pool> {
   std::shared_ptr<Slot> Acquire() {
     std::unique_ptr<Slot> slot;
@@ -50,7 +50,7 @@ namespace {
 
 constexpr int64_t kRowsPerTask = 1 << 15;
 
-// One call of the operation, from its pictures to its gradient.
+// One call of the operation, alive until its backward pass.
 struct Call : torch::CustomClassHolder {
   GaussianCloud cloud;
   std::vector<std::shared_ptr<Slot>> slots;  // one per view
@@ -63,7 +63,7 @@ torch::Tensor View(const Image& image, const std::shared_ptr<Slot>& slot) {
       torch::kFloat32);
 }
 
-// The smallest box that holds all values of `picture` [C,H,W] that are not 0 (NaN is not).
+// Bounding box of the nonzero values of `picture` [C,H,W]; NaN counts as nonzero.
 PixelBox NonZeroBox(const float* picture, int64_t channels, int height, int width) {
   PixelBox box = {width, height, 0, 0};
   const auto filled = [](float v) { return v != 0; };
@@ -80,7 +80,7 @@ PixelBox NonZeroBox(const float* picture, int64_t channels, int height, int widt
   return box.empty() ? PixelBox{} : box;
 }
 
-// Copies the part of `gradient` that is not 0 into `image`, which has the size of `like`.
+// Copies the nonzero part of `gradient` into `image`, resized like `like`. Returns its box.
 PixelBox TakeGradient(const torch::Tensor& gradient, const Image& like, Image& image) {
   const torch::Tensor values = gradient.to(torch::kCPU, torch::kFloat32).contiguous();
   const float* from = values.const_data_ptr<float>();
@@ -103,8 +103,7 @@ PixelBox Union(const PixelBox& a, const PixelBox& b) {
   return {std::min(a.x0, b.x0), std::min(a.y0, b.y0), std::max(a.x1, b.x1), std::max(a.y1, b.y1)};
 }
 
-// The gradient of one view. Inside of `slot.output_gradient.box` both planes count, so where one of them is 0 it has to
-// be written as such.
+// Computes one view's gradient. Both planes are read inside `slot.output_gradient.box`, so zeros there must be written.
 Status BackwardView(const GaussianCloud& cloud, const torch::Tensor& color, const torch::Tensor& alpha, Slot& slot) {
   RenderGradient& out = slot.output_gradient;
   const auto zero_frame = [](Image& image, const PixelBox& inside, const PixelBox& outside) {
@@ -137,7 +136,7 @@ Status BackwardView(const GaussianCloud& cloud, const torch::Tensor& color, cons
   return slot.rasterizer.Backward(cloud, out, slot.gradient);
 }
 
-// Σ over the views, in their order whatever the number of threads.
+// Sum over the views in order, whatever the number of threads.
 torch::Tensor Sum(const Call& call, const torch::Tensor& like, Buffer<float> CloudGradient::*member) {
   torch::Tensor sum = torch::empty(like.sizes(), torch::kFloat32);
   float* out = sum.mutable_data_ptr<float>();

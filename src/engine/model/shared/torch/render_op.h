@@ -13,31 +13,30 @@
 
 namespace anchorsplat {
 
-// What a camera sees, in the layout of Image: planes of rows.
+// A rendered view in the layout of Image: planes of rows.
 struct RenderedView {
   torch::Tensor color;  // [3,H,W] float32 on the CPU, background included, not clamped above 1
   torch::Tensor alpha;  // [1,H,W] 1 − transmittance
 };
 
-// The rasterizer of render/ as an operation of autograd: pictures of a splat, differentiable in all of its values by
-// the rasterizer's own backward pass (which says where it is exact). Views are rendered side by side, one thread each
-// where there are as many views as threads; pictures and gradients are the same bits as those made one after the other.
+// The rasterizer of render/ as an autograd operation. Pictures are differentiable in all values of a splat by the
+// rasterizer's own backward pass, whose header says where it is exact. Views render in parallel, one thread each once
+// there are as many views as threads; results are bit-identical to rendering them in sequence.
 //
-// A part of a picture is rendered by a camera with a smaller size and a shifted principal point: see Crop in
-// core/camera.h.
+// To render part of a picture, pass a cropped camera (Crop in core/camera.h).
 //
-// Buffers are kept for the next call until the object and all graphs made by it are gone.
+// Buffers are reused until the object and every graph it made are gone.
 class RenderOp {
  public:
   RenderOp();
 
-  // `options.gradient` is set by the operation, `options.depth` is ignored. Tensors on another device are copied to the
-  // CPU. Gradients flow to the tensors that ask for them; colours and alphas that no loss used cost nothing.
-  // Errors: those of Rasterizer::Render. A failure in the backward pass (memory) is thrown, as autograd has it.
+  // Renders each camera's view. Ignores options.depth and sets options.gradient itself. Tensors on other devices are
+  // copied to the CPU. Only tensors that require gradients receive them; outputs unused by the loss cost nothing.
+  // Errors: those of Rasterizer::Render. A failed backward pass (memory) throws, as autograd expects.
   Result<std::vector<RenderedView>> operator()(const GaussianTensors& gaussians, std::span<const Camera> cameras,
                                                const RenderOptions& options);
 
-  // Seconds on the clock that backward passes have taken since they were last set to 0.
+  // Wall-clock seconds spent in backward passes since the last reset.
   double backward_seconds() const;
   void ResetBackwardSeconds();
 

@@ -19,7 +19,7 @@ namespace anchorsplat {
 
 namespace {
 
-// A network and the picture it saw last: evaluations compare many pictures with the same truth.
+// A network with the features of the last truth: evaluations compare many pictures with the same one.
 struct Loaded {
   explicit Loaded(LpipsNetwork n) : network(std::move(n)) {}
 

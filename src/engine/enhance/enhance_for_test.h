@@ -15,11 +15,11 @@
 
 namespace anchorsplat {
 
-// Keeps what was logged for as long as it lives.
-class Recorder : public LogSink {
+// Records log messages during its lifetime.
+class LogRecorder : public LogSink {
  public:
-  static std::shared_ptr<Recorder> Install() {
-    auto recorder = std::make_shared<Recorder>();
+  static std::shared_ptr<LogRecorder> Install() {
+    auto recorder = std::make_shared<LogRecorder>();
     recorder->before_ = SetLogSink(recorder);
     return recorder;
   }
@@ -36,15 +36,15 @@ class Recorder : public LogSink {
   std::string text_;
 };
 
-class EnhanceDoor : public testing::Test {
+class EnhanceTest : public testing::Test {
  protected:
-  void SetUp() override { log_ = Recorder::Install(); }
+  void SetUp() override { log_ = LogRecorder::Install(); }
   void TearDown() override { log_->Restore(); }
-  std::shared_ptr<Recorder> log_;
+  std::shared_ptr<LogRecorder> log_;
 };
 
-// A ball of opaque discs on its surface, as a fit of a smooth object with pixels of `pixel` leaves them: eroded, that
-// is with the variance 0.3 px² taken out of discs that closed the surface.
+// A ball of opaque discs on its surface, eroded as a fit with pixels of size `pixel` leaves them: variance 0.3 px² is
+// removed from discs that closed the surface.
 inline GaussianCloud Ball(double pixel, int64_t n = 6000) {
   GaussianCloud cloud;
   cloud.Resize(n, 0);
@@ -58,7 +58,7 @@ inline GaussianCloud Ball(double pixel, int64_t n = 6000) {
     cloud.means[3 * i] = static_cast<float>(0.5 * x);
     cloud.means[3 * i + 1] = static_cast<float>(0.5 * y);
     cloud.means[3 * i + 2] = static_cast<float>(0.5 * z);
-    // Turns z onto the normal.
+    // Rotates z onto the normal.
     const double w = std::sqrt(0.5 * (1 + z)), s = w > 1e-6 ? 0.5 / w : 0;
     cloud.quats[4 * i] = static_cast<float>(w);
     cloud.quats[4 * i + 1] = static_cast<float>(-y * s);

@@ -1,4 +1,4 @@
-#include "reading/showing_gaussians.h"
+#include "reading/visible_gaussians.h"
 
 #include <algorithm>
 #include <array>
@@ -15,15 +15,15 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr float kNearlyBlack = 0.04f;  // brightest channel of the constant colour; ten steps of 255
-constexpr double kLargestAxis = 0.25;  // of Gaussians that tell, in units of the radius that frames the cloud
+constexpr float kNearlyBlack = 0.04f;  // brightest DC channel; ten steps of 255
+constexpr double kLargestAxis = 0.25;  // of central Gaussians, in radii that frame the cloud
 
 std::array<float, 3> MiddleOf(const Framing& framing) {
   return {static_cast<float>(framing.target[0]), static_cast<float>(framing.target[1]),
           static_cast<float>(framing.target[2])};
 }
 
-// ln of the longest axis of Gaussians that tell.
+// ln of the longest axis that a central Gaussian may have.
 double LongestOf(const Framing& framing) { return std::log(kLargestAxis * framing.radius); }
 
 bool IsLonger(const CloudView& rows, size_t i, double longest) {
@@ -31,10 +31,10 @@ bool IsLonger(const CloudView& rows, size_t i, double longest) {
   return !(std::max({scales[0], scales[1], scales[2]}) <= longest);
 }
 
-// Collects TellingGaussians.
-class TellingSearch {
+// Collects CentralGaussians.
+class CentralSearch {
  public:
-  explicit TellingSearch(const Framing& framing) : framing_(framing), longest_(LongestOf(framing)) {}
+  explicit CentralSearch(const Framing& framing) : framing_(framing), longest_(LongestOf(framing)) {}
 
   void Visit(const CloudBlock& block) {
     std::vector<NearestGaussians::Item> near;
@@ -44,16 +44,17 @@ class TellingSearch {
         const double d = block.rows.means[3 * i + a] - framing_.target[a];
         distance += d * d;
       }
-      if (!(distance <= nearest_.farthest()) || !(std::sqrt(distance) <= kShowingFarthest * framing_.radius)) continue;
+      if (!(distance <= nearest_.farthest()) || !(std::sqrt(distance) <= kMaxVisibleDistance * framing_.radius))
+        continue;
       if (IsLonger(block.rows, i, longest_) || block.usable[i] == 0) continue;
       near.push_back(NearestGaussians::ItemOf(distance, block.first + static_cast<int64_t>(i), block.rows, i));
     }
     nearest_.Add(near);
   }
 
-  TellingGaussians Take() {
+  CentralGaussians Take() {
     std::optional<double> next;
-    TellingGaussians out;
+    CentralGaussians out;
     out.cloud = nearest_.Take(&next, &out.rows);
     out.framing = framing_;
     if (next) out.reach = std::sqrt(*next);
@@ -63,7 +64,7 @@ class TellingSearch {
  private:
   Framing framing_;
   double longest_;
-  NearestGaussians nearest_{kMostShowing};
+  NearestGaussians nearest_{kMaxVisible};
 };
 
 }  // namespace
@@ -74,7 +75,7 @@ bool IsNearlyBlack(const CloudView& rows, size_t i) {
 }
 
 bool ShowsInPictures(const CloudView& cloud, size_t i) {
-  return Sigmoid(cloud.opacity_logits[i]) >= kShowingOpacity && !IsNearlyBlack(cloud, i);
+  return Sigmoid(cloud.opacity_logits[i]) >= kVisibleOpacity && !IsNearlyBlack(cloud, i);
 }
 
 double SquaredDistance(const float* a, const float* b) {
@@ -83,69 +84,70 @@ double SquaredDistance(const float* a, const float* b) {
   return sum;
 }
 
-struct ShowingStudy::State {
+struct VisibleGaussiansStudy::State {
   explicit State(int64_t gaussians) : framing_study(std::make_unique<FramingStudy>(gaussians)) {}
 
   int pass = 0;
-  // The first time: where the middle of the cloud is. The second time: what lies there.
+  // First pass: finds the cloud's centre. Second pass: collects what lies there.
   std::unique_ptr<FramingStudy> framing_study;
   Framing framing;
-  NearestGaussians all{kMostShowing};
-  std::unique_ptr<TellingSearch> telling;
+  NearestGaussians all{kMaxVisible};
+  std::unique_ptr<CentralSearch> central;
 
   void LookForShowing(const CloudBlock& block);
 };
 
-void ShowingStudy::State::LookForShowing(const CloudBlock& block) {
+void VisibleGaussiansStudy::State::LookForShowing(const CloudBlock& block) {
   const std::array<float, 3> middle = MiddleOf(framing);
   const double longest = LongestOf(framing);
   std::vector<NearestGaussians::Item> near;
   for (size_t i = 0; i < static_cast<size_t>(block.size()); ++i) {
     if (block.usable[i] == 0) continue;
     const double distance = SquaredDistance(block.rows.means.data() + 3 * i, middle.data());
-    if (distance > all.farthest() || std::sqrt(distance) > kShowingFarthest * framing.radius) continue;
-    if (Sigmoid(block.rows.opacity_logits[i]) < kShowingOpacity || IsLonger(block.rows, i, longest)) continue;
+    if (distance > all.farthest() || std::sqrt(distance) > kMaxVisibleDistance * framing.radius) continue;
+    if (Sigmoid(block.rows.opacity_logits[i]) < kVisibleOpacity || IsLonger(block.rows, i, longest)) continue;
     near.push_back(NearestGaussians::ItemOf(distance, block.first + static_cast<int64_t>(i), block.rows, i));
   }
   all.Add(near);
 }
 
-ShowingStudy::ShowingStudy(const CloudBlocks& blocks) : state_(std::make_unique<State>(blocks.size())) {}
-ShowingStudy::~ShowingStudy() = default;
+VisibleGaussiansStudy::VisibleGaussiansStudy(const CloudBlocks& blocks)
+    : state_(std::make_unique<State>(blocks.size())) {}
+VisibleGaussiansStudy::~VisibleGaussiansStudy() = default;
 
-bool ShowingStudy::done() const { return state_->pass >= 2; }
+bool VisibleGaussiansStudy::done() const { return state_->pass >= 2; }
 
-void ShowingStudy::Visit(const CloudBlock& block) {
+void VisibleGaussiansStudy::Visit(const CloudBlock& block) {
   if (state_->pass == 0) {
     state_->framing_study->Visit(block.first, block.rows);
   } else {
     state_->LookForShowing(block);
-    state_->telling->Visit(block);
+    state_->central->Visit(block);
   }
 }
 
-void ShowingStudy::EndPass() {
+void VisibleGaussiansStudy::EndPass() {
   State& s = *state_;
   if (s.pass == 0) {
     s.framing = s.framing_study->Find();
     s.framing_study.reset();
-    s.telling = std::make_unique<TellingSearch>(s.framing);
+    s.central = std::make_unique<CentralSearch>(s.framing);
   }
   ++s.pass;
 }
 
-ShowingGaussians ShowingStudy::Take() {
-  ShowingGaussians out;
-  out.all = state_->all.Take(nullptr, &out.rows_of_all);
-  out.telling = state_->telling->Take();
+VisibleGaussians VisibleGaussiansStudy::Take() {
+  VisibleGaussians out;
+  out.cloud = state_->all.Take(nullptr, &out.rows);
+  out.central = state_->central->Take();
   return out;
 }
 
-ShowingGaussians FindShowingGaussians(const CloudView& cloud) {
+VisibleGaussians FindVisibleGaussians(const CloudView& cloud) {
   MemoryBlocks blocks(cloud);
-  ShowingStudy study(blocks);
+  VisibleGaussiansStudy study(blocks);
   RowStudy* const studies[] = {&study};
-  (void)Study(blocks, studies);  // memory can be read
+  (void)Study(blocks, studies);  // cannot fail in memory
   return study.Take();
 }
 

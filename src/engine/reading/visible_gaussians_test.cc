@@ -1,4 +1,4 @@
-#include "reading/showing_gaussians.h"
+#include "reading/visible_gaussians.h"
 
 #include <gtest/gtest.h>
 
@@ -75,33 +75,33 @@ std::vector<float> NearestRows(const GaussianCloud& cloud, const Framing& framin
                           static_cast<float>(framing.target[2])};
   for (int64_t i = 0; i < cloud.size(); ++i) {
     const double distance = SquaredDistance(cloud.means.data() + 3 * i, middle);
-    if (IsUsable(cloud, i) && std::sqrt(distance) <= kShowingFarthest * framing.radius && counts(i)) {
+    if (IsUsable(cloud, i) && std::sqrt(distance) <= kMaxVisibleDistance * framing.radius && counts(i)) {
       near.emplace_back(distance, i);
     }
   }
   std::ranges::sort(near);
-  near.resize(std::min(near.size(), kMostShowing));
+  near.resize(std::min(near.size(), kMaxVisible));
   std::ranges::sort(near, {}, [](const auto& item) { return item.second; });
   std::vector<float> out;
   for (const auto& item : near) out.push_back(cloud.opacity_logits[static_cast<size_t>(item.second)]);
   return out;
 }
 
-TEST(ShowingGaussians, AreThoseThatAPlainSearchFinds) {
+TEST(VisibleGaussians, AreThoseThatAPlainSearchFinds) {
   for (const int64_t n : {int64_t{5000}, int64_t{500'000}}) {
     const GaussianCloud cloud = HalfBlackBall(n);
     const Framing framing = FrameCloud(cloud);
     const auto shows = [&](int64_t i) {
-      return Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]) >= kShowingOpacity;
+      return Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]) >= kVisibleOpacity;
     };
-    ShowingGaussians found = FindShowingGaussians(cloud);
-    EXPECT_EQ(std::vector<float>(found.all.opacity_logits.begin(), found.all.opacity_logits.end()),
+    VisibleGaussians found = FindVisibleGaussians(cloud);
+    EXPECT_EQ(std::vector<float>(found.cloud.opacity_logits.begin(), found.cloud.opacity_logits.end()),
               NearestRows(cloud, framing, shows));
-    EXPECT_EQ(found.telling.framing.target, framing.target);
-    EXPECT_EQ(found.telling.framing.radius, framing.radius);
+    EXPECT_EQ(found.central.framing.target, framing.target);
+    EXPECT_EQ(found.central.framing.radius, framing.radius);
 
-    for (const int64_t row : found.rows_of_all) EXPECT_TRUE(shows(row));
-    EXPECT_EQ(found.telling.reach.has_value(), n > 5000);
+    for (const int64_t row : found.rows) EXPECT_TRUE(shows(row));
+    EXPECT_EQ(found.central.reach.has_value(), n > 5000);
   }
 }
 

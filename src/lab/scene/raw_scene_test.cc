@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <limits>
+#include <string>
 
 namespace anchorsplat {
 namespace {
@@ -41,15 +43,20 @@ TEST(RawScene, EveryCutIsNoticed) {
   EXPECT_FALSE(Unpack(packed + "x").ok());
 }
 
-TEST(RawScene, NoByteLeadsAstray) {
+TEST(RawScene, ADamagedByteIsRejectedOrLeavesAValidScene) {
   const std::string packed = Pack(Example());
+  int64_t rejected = 0, accepted = 0;
   for (size_t i = 0; i < packed.size(); ++i) {
     for (const char c : {'\x00', '\x01', '\x7f', '\xff'}) {
       std::string damaged = packed;
       damaged[i] = c;
-      (void)Unpack(damaged);  // any answer, without a crash
+      const auto scene = Unpack(damaged);
+      ++(scene.ok() ? accepted : rejected);
+      if (scene.ok()) EXPECT_TRUE(Unpack(Pack(*scene)).ok()) << "byte " << i;
     }
   }
+  EXPECT_GT(rejected, 0);
+  EXPECT_GT(accepted, 0);
 }
 
 TEST(RawScene, BrokenPromisesAreErrors) {

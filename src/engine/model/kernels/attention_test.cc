@@ -314,9 +314,11 @@ TEST(Attention, SameBitsForAnyNumberOfThreads) {
   }
 }
 
-TEST(Attention, NothingForNoPoints) {
+TEST(Attention, WritesNothingForNoPoints) {
+  std::vector<float> out(64, 7.0f);
   AttentionCpu(
-      {.count = 0, .channels = 64, .heads = 2, .scale = 1, .qkv = nullptr, .patch_rows = nullptr, .out = nullptr});
+      {.count = 0, .channels = 64, .heads = 2, .scale = 1, .qkv = nullptr, .patch_rows = nullptr, .out = out.data()});
+  EXPECT_EQ(out, std::vector<float>(64, 7.0f));
 }
 
 TEST(Attention, NanAndInfinityStayInTheirPatchAndHead) {

@@ -237,10 +237,10 @@ void SayTheSplatStays(const EnhanceOptions& options, const std::string& why) {
 void SayNothingIsDone(const EnhanceOptions& options, const EnhanceReport& report, std::optional<RenderMode> tag) {
   const Reading& reading = *report.reading;
   const std::string_view mode = tag ? NameOf(*tag) : "classic";
-  SayTheSplatStays(options, HasItsWidth(reading.likeliest())
-                                ? Cat("looks like ", LooksInWords(reading), ", which needs no sharpening. --mode ",
-                                      mode, " enhances it anyway")
-                                : Cat("looks like ", LooksInWords(reading),
+  SayTheSplatStays(options, HasFullWidth(reading.likeliest())
+                                ? Cat("looks like ", DescribeProvenance(reading),
+                                      ", which needs no sharpening. --mode ", mode, " enhances it anyway")
+                                : Cat("looks like ", DescribeProvenance(reading),
                                       ", which no method is sure to improve. Pass --cameras or --pixel-size, or "
                                       "--mode ",
                                       mode, " to enhance it anyway"));
@@ -354,7 +354,7 @@ Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceI
   if (input.pixel_sizes.empty()) input.pixel_sizes.assign(1, static_cast<float>(taken));
   if (closer && lost_nothing.empty() && reading.ok()) {
     if (none && !stays) {
-      LogInfo(Cat("looks like ", LooksInWords(*reading), ", which needs no sharpening; only detail is added"));
+      LogInfo(Cat("looks like ", DescribeProvenance(*reading), ", which needs no sharpening; only detail is added"));
     } else if (none && !options.filter_strength) {
       SayNothingIsDone(options, report, cloud.render_mode);
     } else if (!(said && known.pixel)) {  // else nothing was taken from the reading

@@ -204,12 +204,12 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
     const auto [least, greatest] = network.TrainedUpscales();
     const bool other_upscale = least <= greatest && (upscale < 0.99 * least || upscale > 1.01 * greatest);
     const std::string text = Cat(
-        Fixed(100 * (outside + partly) / n, 1),
-        " % of the Gaussians are unlike the network's training data: ", Fixed(100 * outside / n, 1),
-        " % are filtered only, ", Fixed(100 * partly / n, 1), " % partly enhanced",
+        Fixed(100 * (unlike + partly_unlike) / n, 1),
+        " % of the Gaussians are unlike the network's training data: ", Fixed(100 * unlike / n, 1),
+        " % are filtered only, ", Fixed(100 * partly_unlike / n, 1), " % partly enhanced",
         other_upscale ? Cat(". It was trained for --upscale ", Fixed(std::sqrt(least * greatest), 1), ", not ", upscale)
                       : "");
-    outside + partly > kMost* n ? LogWarning(text) : LogInfo(text);
+    unlike + partly_unlike > kMost* n ? LogWarning(text) : LogInfo(text);
   }
   if (result.not_finite > 0 && result.not_finite == count - result.unlike_training) {
     return Error{ErrorCode::kBadFile,
@@ -247,59 +247,60 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
 
 EnhanceMethod ModelMethod() {
   const auto last = std::make_shared<LastNetwork>(), last_stand_in = std::make_shared<LastNetwork>();
-  return {.name = "model",
-          .summary = HasShippedNetwork() ? "one pass of the network (built in, or --model FILE)"
-                                         : "one pass of the network --model FILE",
-          .rank = 1,
-          .adds_detail = true,
-          .is_checkpoint = IsCompactCheckpoint,
-          .keeps_when_asked = true,
-          .options = NetworkOptions(),
-          .needs_pixel_size = [](const EnhanceOptions& options) -> Result<bool> {
-            if (options.model.file.empty()) return true;
-            return HoldsCompactNetwork(options.model.file);
-          },
-          .expected = [last](int64_t count, const EnhanceOptions& options) -> int64_t {
-            const auto network = last->Get(options.model);
-            if (!network.ok()) return count;  // which the run will say
-            if (const auto* published = std::get_if<PublishedNetwork>(network->get())) {
-              const int64_t most = options.model.options.max_gaussians;
-              return published->config().copies * (most > 0 ? std::min(count, most) : count);
-            }
-            const int64_t copies = std::get<CompactNetwork>(**network).config().copies;
-            const int64_t all = count * std::clamp<int64_t>(options.model.copies.value_or(copies), 1, copies);
-            const int64_t most = options.model.options.max_gaussians;
-            return most > 0 ? std::min(all, most) : all;
-          },
-          .seconds = [](const EnhanceOptions& options) { return IsPublished(options.model) ? 2e-4 : 2.5e-5; },
-          .ready = [](const EnhanceOptions& options) -> Status {
-            if (!options.model.file.empty() || HasShippedNetwork()) return {};
-            return Error{ErrorCode::kBadArgument, "the method 'model' needs weights: --model FILE"};
-          },
-          .run = [last, last_stand_in](EnhanceInput input, const EnhanceOptions& options,
-                                       StepReport& report) -> Result<GaussianCloud> {
-            const Shipped shipped = ShippedFor(input, options.model);
-            ANCHORSPLAT_ASSIGN_OR_RETURN(const std::shared_ptr<const AnyNetwork> network,
-                                         last->Get(options.model, shipped));
-            if (const auto* published = std::get_if<PublishedNetwork>(network.get())) {
-              return EnhanceWithPublished(std::move(input), *published, options.model.options, report);
-            }
-            std::shared_ptr<const AnyNetwork> stand_in;
-            if (WantsStandIns(shipped, input, options.model)) {
-              ANCHORSPLAT_ASSIGN_OR_RETURN(stand_in, last_stand_in->Get(options.model, Shipped::kSingle));
-            }
-            ModelSettings model = options.model;
-            if (model.file.empty() && shipped == Shipped::kStandard && !input.is_refined && !model.merge_cost) {
-              model.merge_cost = kMergeCostOfStandard;
-            }
-            Result<GaussianCloud> out = EnhanceWithCompactNetwork(
-                std::move(input), options.upscale, std::get<CompactNetwork>(*network), model, report, options.control,
-                stand_in ? std::get_if<CompactNetwork>(stand_in.get()) : nullptr);
-            if (options.model.file.empty()) {
-              report.facts.emplace_back("network_for_standard_fits", shipped == Shipped::kStandard);
-            }
-            return out;
-          }};
+  return {
+      .name = "model",
+      .summary = HasShippedNetwork() ? "one pass of the network (built in, or --model FILE)"
+                                     : "one pass of the network --model FILE",
+      .rank = 1,
+      .adds_detail = true,
+      .is_checkpoint = IsCompactCheckpoint,
+      .checkpoints_on_request = true,
+      .options = NetworkOptions(),
+      .needs_pixel_size = [](const EnhanceOptions& options) -> Result<bool> {
+        if (options.model.file.empty()) return true;
+        return HoldsCompactNetwork(options.model.file);
+      },
+      .expected_gaussians = [last](int64_t count, const EnhanceOptions& options) -> int64_t {
+        const auto network = last->Get(options.model);
+        if (!network.ok()) return count;  // which the run will say
+        if (const auto* published = std::get_if<PublishedNetwork>(network->get())) {
+          const int64_t most = options.model.options.max_gaussians;
+          return published->config().copies * (most > 0 ? std::min(count, most) : count);
+        }
+        const int64_t copies = std::get<CompactNetwork>(**network).config().copies;
+        const int64_t all = count * std::clamp<int64_t>(options.model.copies.value_or(copies), 1, copies);
+        const int64_t most = options.model.options.max_gaussians;
+        return most > 0 ? std::min(all, most) : all;
+      },
+      .seconds_per_gaussian = [](const EnhanceOptions& options) { return IsPublished(options.model) ? 2e-4 : 2.5e-5; },
+      .ready = [](const EnhanceOptions& options) -> Status {
+        if (!options.model.file.empty() || HasShippedNetwork()) return {};
+        return Error{ErrorCode::kBadArgument, "the method 'model' needs weights: --model FILE"};
+      },
+      .run = [last, last_stand_in](EnhanceInput input, const EnhanceOptions& options,
+                                   StepReport& report) -> Result<GaussianCloud> {
+        const Shipped shipped = ShippedFor(input, options.model);
+        ANCHORSPLAT_ASSIGN_OR_RETURN(const std::shared_ptr<const AnyNetwork> network,
+                                     last->Get(options.model, shipped));
+        if (const auto* published = std::get_if<PublishedNetwork>(network.get())) {
+          return EnhanceWithPublished(std::move(input), *published, options.model.options, report);
+        }
+        std::shared_ptr<const AnyNetwork> stand_in;
+        if (WantsStandIns(shipped, input, options.model)) {
+          ANCHORSPLAT_ASSIGN_OR_RETURN(stand_in, last_stand_in->Get(options.model, Shipped::kSingle));
+        }
+        ModelSettings model = options.model;
+        if (model.file.empty() && shipped == Shipped::kStandard && !input.is_refined && !model.merge_cost) {
+          model.merge_cost = kMergeCostOfStandard;
+        }
+        Result<GaussianCloud> out = EnhanceWithCompactNetwork(
+            std::move(input), options.upscale, std::get<CompactNetwork>(*network), model, report, options.control,
+            stand_in ? std::get_if<CompactNetwork>(stand_in.get()) : nullptr);
+        if (options.model.file.empty()) {
+          report.facts.emplace_back("network_for_standard_fits", shipped == Shipped::kStandard);
+        }
+        return out;
+      }};
 }
 
 const std::vector<EnhanceMethod>& AllMethods() {

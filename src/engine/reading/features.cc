@@ -472,9 +472,9 @@ const std::vector<std::string>& FeatureNames() {
   return names;
 }
 
-Result<SplatFeatures> FeaturesOf(const CloudView& whole, const ShowingGaussians& showing, bool with_pictures) {
-  if (showing.all.size() < kLeastGaussians) {
-    return Error{ErrorCode::kBadArgument, Cat("fewer than ", kLeastGaussians, " visible, small Gaussians")};
+Result<SplatFeatures> FeaturesOf(const CloudView& whole, const VisibleGaussians& visible, bool with_pictures) {
+  if (visible.cloud.size() < kMinGaussians) {
+    return Error{ErrorCode::kBadArgument, Cat("fewer than ", kMinGaussians, " visible, small Gaussians")};
   }
   LeaveIfAbandoned();
   Gaussians sample = SampleStored(visible.cloud);

@@ -57,21 +57,21 @@ std::string_view NameOf(Provenance made) {
 
 std::string_view Describe(Provenance made) {
   switch (made) {
-    case Made::kClassic:
+    case Provenance::kClassic:
       return "a classic 3DGS fit";
-    case Made::kAntialiased:
+    case Provenance::kAntialiased:
       return "an antialiased fit";
-    case Made::kMip:
+    case Provenance::kMip:
       return "a Mip-Splatting fit";
-    case Made::kFiltered:
+    case Provenance::kFiltered:
       return "an already filtered splat";
-    case Made::kEnhanced:
+    case Provenance::kEnhanced:
       return "an already enhanced splat";
-    case Made::kRaised:
+    case Provenance::kRaised:
       return "a fit with raised opacities";
-    case Made::kMesh:
+    case Provenance::kMesh:
       return "a sampled mesh";
-    case Made::kGenerated:
+    case Provenance::kGenerated:
       return "the output of a generator";
   }
   return "";

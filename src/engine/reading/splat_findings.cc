@@ -77,15 +77,15 @@ Status Inspect(CloudBlocks& blocks, const std::function<CloudView()>& whole, Spl
 
 }  // namespace
 
-std::string LooksInWords(const SplatFindings& f) {
-  return f.reading.ok() ? LooksInWords(*f.reading) : "unknown: too few visible Gaussians";
+std::string DescribeProvenance(const SplatFindings& f) {
+  return f.reading.ok() ? DescribeProvenance(*f.reading) : "unknown: too few visible Gaussians";
 }
 
 std::string TreatmentInWords(const SplatFindings& f) {
   if (f.lost_no_width) return "no: its comments say it is already sharp";
   if (!f.reading.ok()) return "only with --pixel-size or --cameras: too few visible Gaussians";
   if (f.treatment.method == TreatmentMethod::kNone) {
-    return HasItsWidth(f.reading->likeliest()) ? "no: it looks already sharp" : "no: no method is sure to help";
+    return HasFullWidth(f.reading->likeliest()) ? "no: it looks already sharp" : "no: no method is sure to help";
   }
   return Cat("yes: ", f.treatment.method == TreatmentMethod::kNetwork ? "network" : "filter", ", pixel size ",
              f.treatment.pixel, ", about +", Fixed(f.treatment.gain, 1), " dB at ", kInfoUpscale, "x");

@@ -133,7 +133,7 @@ Result<CompactNetwork> LoadCompactNetwork(const TensorFile& file) {
     return {};
   });
   if (!network.ok()) return bad(network.error().message);
-  if (!network->KnowsItsDomain()) {
+  if (!network->HasTrainingRange()) {
     LogWarning(
         Cat(file.name(),
             ": has no range of training data (domain.low is above domain.high), so all Gaussians count as like them"));

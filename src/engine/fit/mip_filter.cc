@@ -90,7 +90,8 @@ void FuseMipFilter(std::span<const float> sizes, GaussianCloud& cloud) {
 void CapFilteredOpacities(std::span<const float> sizes, double opacity, GaussianCloud& cloud) {
   for (size_t i = 0; i < cloud.opacity_logits.size(); ++i) {
     double kept = 1;
-    if (sizes[i] > 0) kept = std::exp(SmoothingOf(cloud.log_scales.data() + 3 * i, double{sizes[i]}).log_opacity_factor);
+    if (sizes[i] > 0)
+      kept = std::exp(SmoothingOf(cloud.log_scales.data() + 3 * i, double{sizes[i]}).log_opacity_factor);
     if (!(opacity < kept)) continue;  // o' < k cannot exceed it
     float& logit = cloud.opacity_logits[i];
     logit = std::min(logit, static_cast<float>(std::log(opacity / (kept - opacity))));

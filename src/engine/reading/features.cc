@@ -94,7 +94,7 @@ struct Gaussians {
   std::array<Weighted, 4> weighted;            // ln of the axes, then opacity; weights opacity × area
 };
 
-Gaussians SampleStored(const GaussianCloud& visible) {
+Gaussians SampleOf(const GaussianCloud& visible) {
   Gaussians out;
   const int64_t step = std::max<int64_t>(1, visible.size() / kMostOfStatistics);
   for (int64_t row = 0; row < visible.size(); row += step) {
@@ -477,7 +477,7 @@ Result<SplatFeatures> FeaturesOf(const CloudView& whole, const VisibleGaussians&
     return Error{ErrorCode::kBadArgument, Cat("fewer than ", kMinGaussians, " visible, small Gaussians")};
   }
   LeaveIfAbandoned();
-  Gaussians sample = SampleStored(visible.cloud);
+  Gaussians sample = SampleOf(visible.cloud);
   // √(largest × middle axis) of their 10 % quantiles.
   const double unit = std::exp(0.5 * (sample.weighted[1].Quantile(0.1) + sample.weighted[2].Quantile(0.1)));
   if (!(unit > 0) || !std::isfinite(unit)) {

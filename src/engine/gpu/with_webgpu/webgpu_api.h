@@ -11,19 +11,17 @@
 namespace anchorsplat {
 
 // Functions of the standard header that we call, without the prefix "wgpu".
-#define ANCHORSPLAT_WEBGPU_FUNCTIONS(X)                                                                                \
-  X(CreateInstance)                                                                                                    \
-  X(InstanceProcessEvents) X(InstanceRequestAdapter) X(AdapterGetInfo) X(AdapterInfoFreeMembers) X(AdapterGetLimits)   \
-      X(AdapterHasFeature) X(AdapterRequestDevice) X(AdapterRelease) X(DeviceCreateBindGroup) X(DeviceCreateBuffer)    \
-          X(DeviceCreateCommandEncoder) X(DeviceCreateComputePipeline) X(DeviceCreateShaderModule) X(DeviceGetQueue)   \
-              X(DevicePopErrorScope) X(DevicePushErrorScope) X(QueueOnSubmittedWorkDone) X(QueueSubmit)                \
-                  X(QueueWriteBuffer) X(BufferDestroy) X(BufferGetConstMappedRange) X(BufferMapAsync) X(BufferRelease) \
-                      X(BufferUnmap) X(CommandEncoderBeginComputePass) X(CommandEncoderClearBuffer)                    \
-                          X(CommandEncoderCopyBufferToBuffer) X(CommandEncoderFinish) X(CommandEncoderRelease)         \
-                              X(CommandBufferRelease) X(ComputePassEncoderDispatchWorkgroups) X(ComputePassEncoderEnd) \
-                                  X(ComputePassEncoderRelease) X(ComputePassEncoderSetBindGroup)                       \
-                                      X(ComputePassEncoderSetPipeline) X(ComputePipelineGetBindGroupLayout)            \
-                                          X(BindGroupRelease) X(ShaderModuleRelease)
+// clang-format off
+#define ANCHORSPLAT_WEBGPU_FUNCTIONS(X) \
+  X(CreateInstance) X(InstanceProcessEvents) X(InstanceRequestAdapter) X(AdapterGetInfo) X(AdapterInfoFreeMembers) \
+  X(AdapterGetLimits) X(AdapterHasFeature) X(AdapterRequestDevice) X(AdapterRelease) X(DeviceCreateBindGroup) \
+  X(DeviceCreateBuffer) X(DeviceCreateCommandEncoder) X(DeviceCreateComputePipeline) X(DeviceCreateShaderModule) \
+  X(DeviceGetQueue) X(DevicePopErrorScope) X(DevicePushErrorScope) X(QueueOnSubmittedWorkDone) X(QueueSubmit) \
+  X(QueueWriteBuffer) X(BufferDestroy) X(BufferGetConstMappedRange) X(BufferMapAsync) X(BufferRelease) \
+  X(BufferUnmap) X(CommandEncoderBeginComputePass) X(CommandEncoderClearBuffer) X(CommandEncoderCopyBufferToBuffer) \
+  X(CommandEncoderFinish) X(CommandEncoderRelease) X(CommandBufferRelease) X(ComputePassEncoderDispatchWorkgroups) \
+  X(ComputePassEncoderEnd) X(ComputePassEncoderRelease) X(ComputePassEncoderSetBindGroup) \
+  X(ComputePassEncoderSetPipeline) X(ComputePipelineGetBindGroupLayout) X(BindGroupRelease) X(ShaderModuleRelease)
 // clang-format on
 
 // A loaded WebGPU library. Never unloaded: its threads may live as long as the program.

@@ -75,8 +75,7 @@ struct EnhanceOutcome {
 };
 
 // Enhances a splat trained on small pictures so that it holds up when seen closer. Drops Gaussians with non-finite
-// values.
-// Reports its assumptions as messages of the run. Refinement reacts to RunSettings::stop.
+// values. Reports its assumptions as messages of the run. Refinement reacts to RunSettings::stop.
 //
 // Failures: kBadArgument: no Gaussians, CheckShape, settings out of range or without effect, a method that is not
 // ready, an invalid or empty region; kBadFile: no usable Gaussian, or a bad file named by the settings; kNotFound; kIo.

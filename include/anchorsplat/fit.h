@@ -73,8 +73,7 @@ struct FitOutcome {
 };
 
 // Fits a splat to the pictures of a project: a COLMAP project, a folder with a transforms.json, or a NeRF-synthetic
-// scene.
-// Starts from the project's points or, without any, from random points that many cameras see; with `start`, from
+// scene. Starts from the project's points or, without any, from random points that many cameras see; with `start`, from
 // another splat's centres and colours.
 //
 // Failures: kNotFound; kIo; kBadFile; kBadArgument: settings out of range or contradictory, a start without finite

@@ -31,8 +31,7 @@ struct SplatView {
   std::optional<Rasterization> rasterization = std::nullopt;  // unset: unknown
   std::span<const std::string> comments;                      // from the file, and about what was done to the splat
   // World position of a Gaussian is origin + mean, in double. Zero unless coordinates are too large for float, as on
-  // maps.
-  // Cameras and regions are in world coordinates.
+  // maps. Cameras and regions are in world coordinates.
   std::array<double, 3> origin = {0, 0, 0};
 
   int64_t size() const { return static_cast<int64_t>(opacity_logits.size()); }

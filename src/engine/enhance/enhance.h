@@ -153,7 +153,7 @@ struct MethodUse {
 // An option that affects a method.
 struct MethodOption {
   std::string name;  // as in EnhanceOptions::given
-  // What it still needs for that, as the end of "it works only …": "with --images". Nothing, empty: it works.
+  // What the option still requires, as the end of "it works only …": "with --images". Null or empty result: nothing.
   std::function<std::string(const MethodUse&)> lacks;
 };
 

@@ -46,8 +46,7 @@ struct RefineOptions {
 // How a refinement is run.
 struct RefineControl {
   // Checkpoint file, never removed; empty: none. Written when the user stops the run and every `checkpoint_every`
-  // steps.
-  // Not used with RefineOptions::seconds.
+  // steps. Not used with RefineOptions::seconds.
   std::filesystem::path checkpoint;
   int64_t checkpoint_every = 0;                // steps; 0: only when the user stops the run
   bool resume = false;                         // resume from `checkpoint` if it exists

@@ -32,8 +32,7 @@ bool IsGentle(const RefineInput& input, const RefineOptions& options) {
 bool IsDetail(const RefineOptions& options) { return !options.enlarge_with.empty(); }
 
 // Copies per Gaussian within `max_gaussians`: the last `fixed` stay single, the rest goes to the largest opacity ×
-// size.
-// Empty if there is room for all.
+// size. Empty if there is room for all.
 std::vector<int> CopiesWithin(const GaussianCloud& start, int64_t fixed, RefineOptions& options) {
   const int64_t n = start.size() - fixed, most = options.max_gaussians;
   const bool bound = most > 0 && n * *options.copies > most;

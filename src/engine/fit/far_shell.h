@@ -51,10 +51,9 @@ struct FarShell {
 // room the sphere lies outside the walls, where it is not seen and gets pruned.
 //
 // To decide, pictures are divided into cells, 16 along the longer side, or fewer so that they hold four points on
-// average.
-// A cell is open if it has no point and most of its pixels are neither masked nor transparent, and not all of one
-// colour that is the background's or that of most open cells: objects on a plain background get no shell. Uses at most
-// 200 evenly chosen pictures. Points need not be finite. The same bits for any number of threads.
+// average. A cell is open if it has no point and most of its pixels are neither masked nor transparent, and not all of
+// one colour that is the background's or that of most open cells: objects on a plain background get no shell. Uses at
+// most 200 evenly chosen pictures. Points need not be finite. The same bits for any number of threads.
 //
 // Errors: those of PictureCache; kBadArgument: no views; count below 0 or above kMostOnShell.
 Result<FarShell> MakeFarShell(const TrainingViews& views, const InitialPoints& start, const FarShellOptions& options);

@@ -58,10 +58,9 @@ struct Fitted {
 };
 
 // Runs a whole optimisation of `initial` against the training views, with progress, safe interruption, and final
-// quality.
-// When asked to stop (core/run_context.h), writes the checkpoint and returns the result so far with `interrupted` set.
-// A failed checkpoint write is only a warning. After any other failure the state is kept in the checkpoint, and the
-// message says so. The checkpoint is deleted once the fit is done and the result delivered.
+// quality. When asked to stop (core/run_context.h), writes the checkpoint and returns the result so far with
+// `interrupted` set. A failed checkpoint write is only a warning. After any other failure the state is kept in the
+// checkpoint, and the message says so. The checkpoint is deleted once the fit is done and the result delivered.
 //
 // A checkpoint belongs to these options, views (cameras and bytes of pictures) and start.
 //

@@ -85,8 +85,7 @@ class Fitter {
   bool FollowsExposure() const { return options_.exposure_from >= 0 && state_.step >= options_.exposure_from; }
   bool CutsToBudget(int64_t step) const;
   // At the end of growth, removes what exceeds the limit, least opacity × size first. Only a larger start can exceed
-  // it.
-  // The remaining steps compensate.
+  // it. The remaining steps compensate.
   void KeepToBudget(int64_t step, DensificationChange& change);
   void MeasureMipFilter();
 

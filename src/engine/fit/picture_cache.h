@@ -20,8 +20,8 @@ struct PackedPicture {
 };
 
 // Decodes and undistorts pictures of views (cameras/photograph.h) on first use and caches them as bytes within
-// `budget`.
-// The rest is decoded each time: with views in random order no caching policy does better. One object per thread.
+// `budget`. The rest is decoded each time: with views in random order no caching policy does better. One object per
+// thread.
 class PictureCache {
  public:
   static constexpr int64_t kDefaultBudget = int64_t{4} << 30;  // bytes: 20,000 pictures of 256², 1,300 of 1024²

@@ -58,8 +58,7 @@ Camera RaysOf(const PixelModel& model, const Camera& camera);
 void AverageRays(const Image& rays, int samples, Image& averages);
 
 // Transpose of AverageRays: each ray of a block gets 1/samples² of `averages`. Reads only `box` and writes only its
-// rays.
-// Returns the box of rays.
+// rays. Returns the box of rays.
 PixelBox SpreadToRays(const Image& averages, const PixelBox& box, int samples, Image& rays);
 
 }  // namespace anchorsplat

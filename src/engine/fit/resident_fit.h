@@ -28,9 +28,8 @@ struct ResidentStep {
 };
 
 // The state of a fit on the GPU: cloud, Adam's moments and densification's sums. Target pictures belong to the
-// objective.
-// Work is recorded and runs in order; only methods that say so wait for it. Equals the CPU's up to rounding, with the
-// same bits in every run.
+// objective. Work is recorded and runs in order; only methods that say so wait for it. Equals the CPU's up to rounding,
+// with the same bits in every run.
 class ResidentFit {
  public:
   // Uploads a state. Errors: not enough memory; those of GpuDevice::Allocate.

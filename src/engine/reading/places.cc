@@ -43,8 +43,7 @@ void Extend(Bounds& box, const float* at, bool is_first) {
 }
 
 // Fills each box with all visible Gaussians in it, not just those of the tree: the distances of neighbours are a
-// feature.
-// A box without extent (Gaussians at one point) may hold any number.
+// feature. A box without extent (Gaussians at one point) may hold any number.
 void FillBoxes(const CloudView& cloud, std::span<const int64_t> visible, std::span<const Bounds> boxes,
                std::vector<std::vector<int64_t>>& rows) {
   ParallelFor(0, std::ssize(boxes), 1, [&](int64_t place, int64_t) {

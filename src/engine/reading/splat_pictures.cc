@@ -31,9 +31,8 @@ constexpr double kFieldOfView = std::numbers::pi / 4;
 constexpr double kNearPlane = 0.01;  // relative to the distance; everything is behind it
 constexpr double kSamples = 2;       // rendered pixels per pixel size tried
 // Gaussians with this many times the median footprint are coarse: a ground, walls or clutter that no picture shows
-// well.
-// In fits of objects seen from all around they form at most 0.02 of the outlines; in photographs, at five and above,
-// many.
+// well. In fits of objects seen from all around they form at most 0.02 of the outlines; in photographs, at five and
+// above, many.
 constexpr float kCoarse = 6;
 
 // ln √(largest × middle axis).

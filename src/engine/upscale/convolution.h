@@ -9,8 +9,7 @@
 namespace anchorsplat {
 
 // Packs weights of a 2-D convolution: `weights` [outputs, inputs, side, side] and `bias` [outputs] as in PyTorch's
-// Conv2d.
-// Each row of a 3×3 kernel becomes one tap with the inputs of three pixels.
+// Conv2d. Each row of a 3×3 kernel becomes one tap with the inputs of three pixels.
 PackedWeights PackConvolution(const float* weights, const float* bias, int64_t outputs, int64_t inputs, int64_t side);
 
 // The same for a transposed convolution, PyTorch's ConvTranspose2d(4, stride=2, padding=1): `weights` [inputs, outputs,

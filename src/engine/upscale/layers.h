@@ -19,8 +19,7 @@ struct ConvolutionValues {
 };
 
 // Output channels C of NAME.weight [C, inputs, side, side]. Errors (kBadFile, with the path): no such tensor; another
-// rank;
-// C not in 1 … kMostMapChannels.
+// rank; C not in 1 … kMostMapChannels.
 Result<int64_t> ReadOutputs(const TensorFile& file, const std::string& name);
 
 // Reads a tensor of exactly this shape. Errors (kBadFile, with the path): missing, another shape, non-finite values.

@@ -23,8 +23,7 @@ struct UpscalerInfo {
 //
 // Input colours are sRGB 0–1 as in Image; the first layer gets (colour − input.mean)·input.scale. Large pictures are
 // processed in tiles that overlap by the receptive field: the bits are those of a single piece, for any number of
-// threads.
-// The last bit may differ between SIMD widths.
+// threads. The last bit may differ between SIMD widths.
 class Upscaler {
  public:
   // Errors: those of TensorFile; kBadFile with the path: no upscaler; another format version; an unknown architecture,

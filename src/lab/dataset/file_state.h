@@ -8,12 +8,13 @@
 
 namespace anchorsplat {
 
-// What results are made from, as text that changes with it. Files count by name, size and time of their last change, so
-// that nothing has to be read.
+// Appends a text that changes when the inputs of a result do. Files count by name, size and modification time, so
+// nothing
+// is read.
 void AddFileState(std::string& state, const std::filesystem::path& file);
-void AddCameraState(std::string& state, std::span<const Camera> cameras);  // and of their pictures
+void AddCameraState(std::string& state, std::span<const Camera> cameras);  // including their pictures
 
-// A word for cameras and their pictures.
+// Fingerprint of cameras and their pictures.
 std::string CamerasState(std::span<const Camera> cameras);
 
 }  // namespace anchorsplat

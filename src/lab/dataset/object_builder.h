@@ -33,11 +33,10 @@ inline constexpr const char* kSplatName = "splat.ply";
 std::filesystem::path CheckpointPath(const std::filesystem::path& low_folder, int64_t steps);  // as in gsplat's trainer
 
 // Builds an object: mesh → views → low-quality splat → files, in BuildingFolder, which is finally renamed to
-// DATASET/NAME.
-// With defects (picture_defects.h) the fit uses a folder of its own, captured/; everything else is unaffected. A
-// derived object takes its base's views, and its splat processed by a format or by `program` (derived_object.h).
-// Continues an earlier attempt of the same job: finished views are reused, and the fit resumes from its checkpoint.
-// Deterministic except for the seconds in the record.
+// DATASET/NAME. With defects (picture_defects.h) the fit uses a folder of its own, captured/; everything else is
+// unaffected. A derived object takes its base's views, and its splat processed by a format or by `program`
+// (derived_object.h). Continues an earlier attempt of the same job: finished views are reused, and the fit resumes from
+// its checkpoint. Deterministic except for the seconds in the record.
 //
 // When asked to stop (core/run_context.h) the fit ends in order (kInterrupted), and the next attempt continues. Other
 // errors: kExists: a file has the object's name; those of the mesh, the views and the fit; the file `stage` tells

@@ -48,8 +48,7 @@ struct ObjectSettings {
   bool backdrop = false;    // puts the object in a textured room (backdrop.h); meshes only
 
   // For derived objects: the recipe entry `from` of the same mesh whose splat is processed by `after`, one of
-  // kAfterNames.
-  // Set both or neither; all other settings are those of `from`.
+  // kAfterNames. Set both or neither; all other settings are those of `from`.
   std::string from;
   std::string after;
 

@@ -30,9 +30,8 @@ struct ProcessPoolOptions {
 };
 
 // Runs `count` processes, starting `task(i)` in order. Calls `ended(i, end)` on the calling thread whenever one has
-// ended.
-// Each has its own process group, which Ctrl-C at the terminal does not reach. It is terminated (SIGTERM, ten seconds
-// later SIGKILL) when its time is up or the run is asked to stop (core/run_context.h).
+// ended. Each has its own process group, which Ctrl-C at the terminal does not reach. It is terminated (SIGTERM, ten
+// seconds later SIGKILL) when its time is up or the run is asked to stop (core/run_context.h).
 //
 // `ended` may return false to stop. Errors: kIo if a process cannot be started; running ones are ended first.
 Status RunProcesses(int64_t count, const std::function<ProcessTask(int64_t)>& task,

@@ -32,9 +32,8 @@ struct PlacedMesh {
 };
 
 // Reads a text file with one piece per line: address, x, y, z, turn, height. Skips empty lines and those starting with
-// #.
-// Addresses are below `objects`, as in dataset_split.h. Errors name file and line: kBadFile; those of ReadFileBytes and
-// ResolveAddresses.
+// #. Addresses are below `objects`, as in dataset_split.h. Errors name file and line: kBadFile; those of ReadFileBytes
+// and ResolveAddresses.
 Result<std::vector<PlacedMesh>> ReadFurniture(const std::filesystem::path& file, const std::filesystem::path& objects);
 
 struct Room {

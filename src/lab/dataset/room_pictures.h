@@ -10,8 +10,7 @@
 namespace anchorsplat {
 
 // Pictures in the room of room.h, with detail of every size down to a millimetre or less, so that closer views show
-// more.
-// Each depends on its seed only, on every machine. Those that repeat on a surface are seamless.
+// more. Each depends on its seed only, on every machine. Those that repeat on a surface are seamless.
 Texture WoodFloorPicture(uint64_t seed);  // planks, 2.4 m a side
 Texture WallpaperPicture(uint64_t seed);  // stripes, rosettes and fine print, 0.5 m a side
 Texture PlasterPicture(uint64_t seed);    // the ceiling, 1 m a side

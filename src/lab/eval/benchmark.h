@@ -20,8 +20,8 @@ namespace anchorsplat {
 struct BenchmarkEntry {
   std::string name;  // of the folder
   std::filesystem::path folder;
-  std::string kind = {};    // entry of the recipe that the data set's object was made by; empty where nothing says so
-  bool is_capture = false;  // pictures and cameras alone: OpenCapturedObject (eval/capture.h) opens it
+  std::string kind = {};    // its recipe entry in the data set's manifest; empty if there is none
+  bool is_capture = false;  // pictures and cameras only, opened by OpenCapturedObject (eval/capture.h)
 };
 
 // Lists a benchmark's objects by name. `folder` contains data sets as in dataset/scene_reader.h (without rejected

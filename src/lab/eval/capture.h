@@ -9,15 +9,14 @@
 
 namespace anchorsplat {
 
-// The objects of a folder of captures, in order of their names: the folders in it, or `folder` itself if it has
-// cameras. Folders of the layout of the repository's examples have a splat and are no captures, but objects all the
-// same.
+// Lists a folder of captures by name: its folders, or `folder` itself if it has cameras. Folders in the examples'
+// layout,
+// which have a splat, are listed as ordinary objects.
 //
 // Errors: kNotFound: no folder, or nothing in it.
 Result<std::vector<BenchmarkEntry>> ListCaptures(const std::filesystem::path& folder);
 
-// The object that the recipe makes of a capture (dataset/capture.h). The fit is made here where `fit_folder` does not
-// hold it yet.
+// Makes a benchmark object of a capture (dataset/capture.h). Fits the splat unless `fit_folder` already has it.
 //
 // Errors: those of OpenCapture.
 Result<BenchmarkObject> OpenCapturedObject(const BenchmarkEntry& entry, const CaptureRecipe& recipe,

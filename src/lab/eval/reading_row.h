@@ -60,8 +60,7 @@ class ReadingRows {
   ~ReadingRows();
 
   // Fingerprint of what a row depends on besides the program: the task, its files' current versions, the number of
-  // views.
-  // Stored in the row as "state", so that outdated rows are made again.
+  // views. Stored in the row as "state", so that outdated rows are made again.
   std::string StateOf(const ReadingTask& task) const;
 
   // Makes a row for the table. Errors: those of reading and of processing the splat; kBadFile: others_from beyond the

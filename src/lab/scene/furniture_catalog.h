@@ -23,8 +23,7 @@ struct CatalogEntry {
 };
 
 // A furniture library of Sweet Home 3D (.sh3f): a ZIP archive of models, mostly OBJ, and a properties file that lists
-// them.
-// Only the library's own language is read.
+// them. Only the library's own language is read.
 //
 // An object's licence comes from the licence file beside its model (a name with "licen" in it) if that names one
 // (licence.h), else from the properties file: the property `license` or the initial comment.

@@ -16,10 +16,10 @@ namespace anchorsplat {
 // Target of a rendered view.
 struct TrueView {
   Image picture;                      // [3,H,W], over the background
-  std::array<float, 3> background{};  // that the render has, too
-  PixelBox object;                    // of pixels that differ from the background; empty: none does
-  PixelBox perceptual;                // what LPIPS looks at; empty: nothing
-  Buffer<uint8_t> ignored;  // [H,W] not 0: the picture says nothing there; empty: it says something everywhere
+  std::array<float, 3> background{};  // same as the render's
+  PixelBox object;                    // bounding box of pixels that differ from the background; empty: none
+  PixelBox perceptual;                // region for LPIPS; empty: none
+  Buffer<uint8_t> ignored;            // [H,W] not 0: no target there; empty: none ignored
 };
 
 // Loss terms of one view, for the log. With d = min(render, 1) − truth, W·H pixels of three channels, and F the number

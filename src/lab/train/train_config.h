@@ -57,16 +57,16 @@ struct DataConfig {
   double least_upscale = 0, greatest_upscale = 0;
 };
 
-// How captures become pairs (dataset/capture.h).
+// How captures become training objects (dataset/capture.h).
 struct CapturesConfig {
   int downscale = 4;
-  int hold_out = 4;                         // every so many views train the network and not the fit
+  int hold_out = 4;                         // holds out every Nth view from the fit, to train the network
   std::vector<int64_t> fit_steps = {1000};  // of each capture's fits
 
   bool operator==(const CapturesConfig&) const = default;
 };
 
-// What is drawn anew each time a splat is used. Standard deviations and largest values; 0: not at all.
+// Random augmentation, drawn anew whenever a splat is used. Standard deviations or maxima; 0: off.
 struct AugmentationConfig {
   bool rotate = false;          // the world, with SH and cameras
   bool mirror = false;          // every second splat

@@ -12,9 +12,9 @@ namespace anchorsplat {
 // A training request from the command line. Free of LibTorch, which the program that forwards it lacks.
 struct TrainRequest {
   std::vector<std::filesystem::path> datasets;    // folders of dataset/scene_reader.h
-  std::string split;                              // of each of them: "train", …; empty: all objects
-  std::vector<std::filesystem::path> validation;  // folders; empty: the split "validation" of the datasets, or none
-  std::filesystem::path captures;  // folder of captures (dataset/capture.h) to train on, too; may be empty
+  std::string split;                              // of each data set: "train", …; empty: all objects
+  std::vector<std::filesystem::path> validation;  // folders; empty: the data sets' split "validation", if any
+  std::filesystem::path captures;  // folder of captures to train on as well (dataset/capture.h); may be empty
   std::filesystem::path config;
   std::filesystem::path out;    // folder for all output
   std::filesystem::path cache;  // for true pictures, shared by trainings; empty: out / "cache"

@@ -14,14 +14,14 @@ namespace anchorsplat {
 
 // Objects of a training, found but not read.
 struct TrainingData {
-  std::vector<SceneEntry> training;    // in order of data sets and names
-  std::vector<SceneEntry> validation;  // none of them in `training`, by folder or by name
+  std::vector<SceneEntry> training;    // by data set, then name
+  std::vector<SceneEntry> validation;  // disjoint from `training`, by folder and by name
   std::vector<TrainingCapture> captures;
-  std::string names;  // JSON: those of `training`, and "capture 1", … of captures, whose owners may want no other
+  std::string names;  // JSON: names of `training`; captures are "capture 1", …, as their owners may want no other
 };
 
-// Objects without a splat are left out with a warning. Errors: those of ListScenes, FindCaptures and OpenCapture;
-// kNotFound: nothing to train on. Captures are fitted here where `cache` has no fit of theirs.
+// Leaves out objects without a splat, with a warning. Fits captures unless `cache` has their fits. Errors: those of
+// ListScenes, FindCaptures and OpenCapture; kNotFound: nothing to train on.
 Result<TrainingData> FindTrainingData(const TrainRequest& request, const CapturesConfig& captures,
                                       const std::filesystem::path& cache);
 

@@ -17,14 +17,14 @@
 
 namespace anchorsplat {
 
-// A capture and how it becomes a pair.
+// A capture, and how it becomes a training object.
 struct TrainingCapture {
   CaptureFolder capture;
   CaptureRecipe recipe;
   std::filesystem::path fit_folder;
 };
 
-// An object of a data set, ready to be trained on or measured with.
+// An object of a data set, ready for training or validation.
 struct TrainingObject {
   std::string name;
   GaussianCloud cloud;             // the low-quality splat without non-finite rows
@@ -49,13 +49,13 @@ struct TrainingObject {
 Result<std::shared_ptr<TrainingObject>> OpenTrainingObject(const SceneEntry& entry, int views_per_object,
                                                            const std::filesystem::path& cache);
 
-// The same of a capture. Its photographs at full size are the truth, and training sees the views that the fit has not
-// seen: what a network does to the others may be what the fit has learned by heart.
+// Opens a capture. The truth are its full-size photographs. Training uses the views that the fit was not trained on,
+// because for the others a network may learn what the fit has memorised.
 //
 // Errors: those of OpenCapture and PixelSizesFromCameras; kBadFile: no view is held out.
 Result<std::shared_ptr<TrainingObject>> OpenTrainingCapture(const TrainingCapture& entry);
 
-// `most` of `values`, evenly spread; all when there are not as many or `most` is 0.
+// At most `most` of `values`, evenly spread; all if `most` is 0.
 std::vector<size_t> EvenlySpread(const std::vector<size_t>& values, size_t most);
 
 // Cache of the objects used last, by index. Thread-safe.

@@ -21,18 +21,17 @@ namespace anchorsplat {
 
 // Fast repeated access to an object's high-resolution pictures. Stored views are read from the data set. Views rendered
 // on demand, which takes tenths of a second each, are rendered once and cached in a folder as PNG, cropped to what they
-// show.
-// Safe for several threads and several programs at once.
+// show. Safe for several threads and several programs at once.
 class TrueViews {
  public:
   // `cache`: folder for all objects of all trainings. Created with the first view.
   TrueViews(SceneEntry entry, const Scene& scene, const std::filesystem::path& cache);
 
-  // Photographs that `picture` opens, of the sizes of `views`, without an object on a background: all of them counts,
-  // but for pixels that are masked.
+  // Photographs opened by `picture`, of the sizes of `views`. They have no object on a background, so all unmasked
+  // pixels count.
   TrueViews(const std::vector<Camera>& views, std::function<Result<ViewPicture>(size_t view)> picture);
 
-  // Pixels over the object's background. Errors: those of Scene::HighPicture, ReadImage and WritePng.
+  // Picture over the object's background. Errors: those of Scene::HighPicture, ReadImage and WritePng.
   Result<TrueView> Load(size_t view) const;
 
   // Renders those of `views` that are neither stored nor cached. Faster than on demand, as the mesh is opened once.
@@ -48,8 +47,8 @@ class TrueViews {
   // A picture cropped to what it shows, 3 or 4 channels.
   struct Part {
     Image picture;
-    PixelBox box;             // where in the view; as large as the picture
-    Buffer<uint8_t> ignored;  // [H,W] of the picture, not 0: it says nothing there; empty: nowhere
+    PixelBox box;             // position in the view; same size as the picture
+    Buffer<uint8_t> ignored;  // [H,W] of the picture, not 0: no target there; empty: none ignored
   };
   struct Kept;
   struct File {

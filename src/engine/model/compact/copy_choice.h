@@ -60,8 +60,7 @@ class CopyPlan {
   int64_t merged() const;  // Gaussians saved: copies removed, minus stand-ins used
 
   // Writes merged copies to the rows of `cloud` that stay and sets keep[row] = 0 for removed copies and unused
-  // stand-ins.
-  // `into`, if not null, has one entry per row and is filled for merged groups as CopyGroup::Write does.
+  // stand-ins. `into`, if not null, has one entry per row and is filled for merged groups as CopyGroup::Write does.
   void ApplyTo(GaussianCloud& cloud, std::vector<char>& keep, std::vector<int64_t>* into = nullptr) const;
 
  private:

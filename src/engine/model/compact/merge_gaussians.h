@@ -9,9 +9,8 @@ namespace anchorsplat {
 // view directions, in closer-view pixels, with the rasterizer's dilation for that view included.
 //
 // A Gaussian is invisible where its alpha is below 1/255. Copies are faint: at opacity 0.02 that is a fifth of the
-// mass.
-// So MergeGaussian has the mass and variance of the visible part only (VisibleVarianceShare). Merging Gaussians as
-// stored would make dense splats too opaque, which costs 1 dB.
+// mass. So MergeGaussian has the mass and variance of the visible part only (VisibleVarianceShare). Merging Gaussians
+// as stored would make dense splats too opaque, which costs 1 dB.
 //
 // Two Gaussians together have alpha α_a + α_b − α_a·α_b. The merged one has that function's mass, mean and covariance.
 // Its opacity follows from its mass in the three views; if that exceeds the maximum opacity, it is widened instead. it

@@ -52,7 +52,9 @@ TEST(RawScene, ADamagedByteIsRejectedOrLeavesAValidScene) {
       damaged[i] = c;
       const auto scene = Unpack(damaged);
       ++(scene.ok() ? accepted : rejected);
-      if (scene.ok()) EXPECT_TRUE(Unpack(Pack(*scene)).ok()) << "byte " << i;
+      if (scene.ok()) {
+        EXPECT_TRUE(Unpack(Pack(*scene)).ok()) << "byte " << i;
+      }
     }
   }
   EXPECT_GT(rejected, 0);

@@ -31,7 +31,7 @@ Result<GpuCloudBlock> GpuCloud::MakeBlock(GpuDevice& device, int64_t first, int6
   GpuCloudBlock block;
   block.first = first, block.count = count;
   const auto rows = static_cast<uint64_t>(count);
-  const auto stride = static_cast<uint64_t>(12 * ShCoefficients(sh_degree));
+  const auto stride = 12 * static_cast<uint64_t>(ShCoefficients(sh_degree));
   const auto allocate = [&](GpuMemory& memory, uint64_t bytes, std::string_view what) -> Status {
     Result<GpuMemory> made = device.Allocate(rows * bytes, what);
     if (!made.ok()) return made.error();

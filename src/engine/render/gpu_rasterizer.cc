@@ -258,7 +258,7 @@ Result<bool> GpuRasterizer::Draw(GpuCloud& cloud, const Camera& camera, float ne
     ANCHORSPLAT_RETURN_IF_ERROR(cloud.Stream(*device));
     room = MakeRoom(whole);
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(room);
+  if (!room.ok()) return room.error();
   Project(cloud);
   SortAndCount();
   ANCHORSPLAT_RETURN_IF_ERROR(ReadCounts());
@@ -272,10 +272,11 @@ Result<bool> GpuRasterizer::Draw(GpuCloud& cloud, const Camera& camera, float ne
   const int64_t tiles_x = view.size[2], tile_rows = view.size[3];
   for (int64_t row = 0; row < tile_rows; row += tile_rows_per_band) {
     const int64_t end = std::min(tile_rows, row + tile_rows_per_band) * tiles_x;
-    for (int64_t first = row * tiles_x, last = first; first < end; first = last, ++runs) {
-      last = EndOfRun(first, end);
+    for (int64_t first = row * tiles_x; first < end; ++runs) {
+      const int64_t last = EndOfRun(first, end);
       ListRun(first, last);
       Blend(first, last, row);
+      first = last;
     }
     if (output != nullptr) ANCHORSPLAT_RETURN_IF_ERROR(ReadPicture(row, options.depth, *output));
   }

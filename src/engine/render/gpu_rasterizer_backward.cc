@@ -189,7 +189,7 @@ Status GpuRasterizerBackward::PlaceSlots(Run& run) {
     const int64_t slots = std::max(int64_t{total}, 32 * int64_t{many});  // the second reveals an overflow of the first
     const bool shortest = run.last == run.first + 1;
     if (slots <= most) {
-      const Status status = room(slots);
+      Status status = room(slots);
       if (status.ok()) return {};
       most = slots / 2;
       if (shortest || most < kFewestSlots) return status;
@@ -344,7 +344,7 @@ Status GpuRasterizerBackward::Project(GpuCloud& cloud, const RenderOptions& opti
     most = (most / 2 + kGpuWorkgroupSize - 1) / kGpuWorkgroupSize * kGpuWorkgroupSize;
     room = MakeRoom(r, most, stride, options.absgrad, g);
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(room);
+  if (!room.ok()) return room;
   for (size_t k = 0; k < cloud.block_count(); ++k) {
     const GpuCloudBlock& block = cloud.Block(*r.device, k);
     for (int64_t offset = 0; offset < block.count; offset += most) {

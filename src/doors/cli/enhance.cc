@@ -369,9 +369,9 @@ void AddEnhance(CLI::App& app, Program& program) {
   verb.add_flag("--view", flags->view, "Also write an HTML page beside the output that shows before and after");
   flags->how.AddTo(verb);
   flags->size.AddTo(verb);
+  program.device.AddTo(verb);
   ShortenHelp(verb, {"--output", "--out-dir", "--upscale", "--quality", "--cameras", "--images", "--region",
                      "--max-gaussians", "--view", "--device", "--overwrite", "--quiet", "--json"});
-  program.device.AddTo(verb);
   verb.callback([flags, &verb, &program] {
     flags->how.options.given = GivenOptions(verb);
     program.run = [flags, &program] { return RunEnhance(*flags, program); };

@@ -76,7 +76,7 @@ def test_a_network_keeps_what_it_has_made(cloud, tmp_path):
     assert same(again, whole) and report["model"]["blocks_resumed"] == 0
     assert not state.exists()  # the result is there
     state.write_bytes(b"my notes")
-    with pytest.raises(anchorsplat.ExistsError, match="is no checkpoint"):
+    with pytest.raises(anchorsplat.ExistsError, match="is not a checkpoint"):
         anchorsplat.enhance(cloud, method="model", checkpoint=state)
     with pytest.raises(anchorsplat.BadFileError, match="is not a checkpoint"):
         anchorsplat.enhance(cloud, method="model", checkpoint=state, resume=True)

@@ -151,7 +151,7 @@ def test_a_fit_comes_closer(cloud, tmp_path):
     assert report["steps"] == 40 and len(fitted) == report["gaussians"]["out"] and fitted.sh_degree == 0
     started, report = anchorsplat.fit(tmp_path, steps=1, init_splat=cloud, hold_out=0)
     assert report["initial_points"] == "splat" and report["gaussians"]["in"] == len(cloud)
-    with pytest.warns(anchorsplat.SplatWarning, match="a training pixel of"):
+    with pytest.warns(anchorsplat.SplatWarning, match="their training pixel"):
         _, report = anchorsplat.refine(cloud, tmp_path, steps=3, k=1, hold_out=0)
     assert report["refine"]["steps"] == 3
     with pytest.raises(anchorsplat.BadArgumentError, match="--resume has no effect here"):

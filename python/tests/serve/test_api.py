@@ -154,7 +154,7 @@ def test_edits_are_the_command_lines_in_their_order(server: Server, tmp_path: Pa
         ({"filter_floaters": "0"}, "one factor above 0"),
         ({"mirror": ""}, "an axis"),
         ({"action_axes": "LUF"}, "has an effect with edits only"),
-        ({"action_axes": "XYZ", "translate": "1,2,3"}, "are no axes"),
+        ({"action_axes": "XYZ", "translate": "1,2,3"}, "is not a set of axes"),
         ({"edits": "translate"}, "edits"),
         ({"edits": "translate", "translate": "1,2,3"}, "a name of its own"),
         ({"dry_run": "true"}, "dry_run"),

@@ -297,7 +297,7 @@ TEST(Fit, HasItsModePixelsAndStart) {
   EXPECT_THAT(FitProject(folder.path(), other).failure().message, testing::HasSubstr("no effect"));
   other.initial_extent.reset();
   other.starting_points = StartingPoints::kProject;
-  EXPECT_THAT(FitProject(folder.path(), other).failure().message, testing::HasSubstr("it has none"));
+  EXPECT_THAT(FitProject(folder.path(), other).failure().message, testing::HasSubstr("no points to start from"));
 }
 
 // A name given for the state of a fit by mistake costs nothing.

@@ -62,7 +62,7 @@ TEST_F(ConvertVerb, LevelsOfDetail) {
   const nlohmann::json row =
       ExpectJson({"convert", scene, folder_ / "again.sog", "--report", "--report-views", "1"})[0];
   EXPECT_GT(row["psnr"]["mean"], 30);
-  ExpectRefused({"convert", scan_, "--lod", folder_ / "scan.sog"}, ErrorCode::kBadArgument, {"--lod writes a folder"});
+  ExpectRefused({"convert", scan_, "--lod", folder_ / "scan.sog"}, ErrorCode::kBadArgument, {"--lod needs a folder"});
   ExpectDone({"convert", scan_, "--lod", folder_ / "scene.v2"});
   EXPECT_TRUE(std::filesystem::exists(folder_ / "scene.v2/lod-meta.json"));
 }
@@ -160,7 +160,7 @@ TEST_F(ConvertVerb, Batches) {
                 {"would both become"});
   ExpectRefused({"convert", scan_, "--out-dir", folder_ / "twice", "--to", "obj"}, ErrorCode::kBadArgument, {"--to"});
   ExpectRefused({"convert", scan_, "--out-dir", folder_ / "away/in", "--to", "../x.ply"}, ErrorCode::kBadArgument,
-                {"--to: '../x.ply' is no format"});
+                {"--to: '../x.ply' cannot be written"});
   EXPECT_FALSE(std::filesystem::exists(folder_ / "twice"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "away"));
 }
@@ -187,7 +187,7 @@ TEST_F(ConvertVerb, KindsThatAreSaid) {
   EXPECT_THAT(ExpectDone({"convert", folder_ / "scan.bytes", folder_ / "out.ply", "--from", ".splat"}).out,
               HasSubstr("(splat, 6.4 kB)"));
   ExpectRefused({"convert", folder_ / "scan.bytes", folder_ / "csv.ply", "--from", "csv"}, ErrorCode::kBadArgument,
-                {"--from: 'csv' is no format that is read"});
+                {"--from: 'csv' is not a readable format"});
 }
 
 TEST_F(ConvertVerb, OverwritesOnlyWhenTold) {
@@ -264,7 +264,7 @@ TEST_F(ConvertVerb, KeepsWhatAPlySaysBesideItsGaussians) {
       ExpectDone({"enhance", extras, "-o", folder_ / "others.ply", "--method", "model", "--pixel-size", "0.4", "--mode",
                   "classic"})
           .err,
-      HasSubstr("other properties of its Gaussians are dropped, as those of the result are others: label, normals"));
+      HasSubstr("extra properties dropped, as the Gaussians changed: label, normals"));
   EXPECT_FALSE(has_labels("others.ply"));
 }
 

@@ -202,7 +202,7 @@ TEST_F(EnhanceVerb, Qualities) {
   EXPECT_EQ(good["method"], "model+refine");
   EXPECT_EQ(good["refine"]["k"], 1);
   ExpectRefused(Enhance({"--quality", "good", "--method", "filter"}, "bad.ply"), ErrorCode::kBadArgument,
-                {"--quality good is --method model+refine, and --method filter was given"});
+                {"--quality good is --method model+refine, so it excludes --method filter"});
   ExpectRefused(Enhance({"--quality", "perfect"}, "bad.ply"), ErrorCode::kBadArgument, {"--quality"});
   ExpectRefused(Enhance({"--quality", "good", "--images", Biplane() / "transforms_lr.json"}, "bad.ply"),
                 ErrorCode::kBadArgument, {"--quality best"});
@@ -255,7 +255,7 @@ TEST_F(EnhanceVerb, RefinementsThatMakeNoSense) {
   WriteText(folder_ / "mine", "mine");
   refused({"--steps", "2", "--checkpoint", scan_}, ErrorCode::kBadArgument);
   refused({"--steps", "2", "--checkpoint", folder_ / "x.ply"}, ErrorCode::kBadArgument, "is the output itself");
-  refused({"--steps", "2", "--checkpoint", folder_ / "mine", "-w"}, ErrorCode::kExists, "is no checkpoint");
+  refused({"--steps", "2", "--checkpoint", folder_ / "mine", "-w"}, ErrorCode::kExists, "is not a checkpoint");
   EXPECT_EQ(FileBytes(folder_ / "mine"), "mine");
   ExpectRefused({"enhance", scan_, "-o", "/proc/x.ply", "--method", "refine", "--pixel-size", "0.02"}, ErrorCode::kIo);
   EXPECT_FALSE(Exists("x.ply"));

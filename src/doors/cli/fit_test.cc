@@ -118,7 +118,7 @@ TEST_F(FitVerb, RefusesWhatMakesNoSense) {
   refused({"--steps", "0"}, "--steps");
   refused({"--refine-every", "0"}, "--refine-every");
   refused({"--hold-out", "1"}, "");
-  refused({"--init", "points"}, "has none");
+  refused({"--init", "points"}, "has no points for --init points");
   refused({"--upscale", "2"}, "--pixel");
   refused({"--init-extent", "0.3"}, "--init random");
   refused({"--init", "random", "--init-extent", "0"}, "--init-extent");

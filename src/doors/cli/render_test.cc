@@ -49,7 +49,7 @@ TEST_F(RenderVerb, OnePictureOfEveryCamera) {
   ExpectDone(Render("clear.png", {"--cameras", cameras, "--view", "003", "--transparent"}));
   EXPECT_EQ(ReadImage(folder_ / "clear.png")->channels, 4);
   ExpectRefused(Render("x.png", {"--cameras", cameras, "--view", "999"}), ErrorCode::kBadArgument, {"999"});
-  ExpectRefused(Render("x", {"--cameras", cameras, "--size", "100x50"}), ErrorCode::kBadArgument, {"another shape"});
+  ExpectRefused(Render("x", {"--cameras", cameras, "--size", "100x50"}), ErrorCode::kBadArgument, {"another aspect ratio"});
   ExpectRefused(Render("x", {"--cameras", cameras, "--radius", "3"}), ErrorCode::kBadArgument, {"--radius"});
 }
 
@@ -119,8 +119,8 @@ TEST_F(RenderVerb, RefusesWhatMakesNoSense) {
   refused("x.png", {"--orbit", "1", "--size", "0x5"}, "--size");
   refused("x.png", {"--orbit", "1", "--size", "32768x32768"}, "pixels");
   refused("x.png", {"--orbit", "0"}, "--orbit");
-  refused("x", {"--orbit", "2", "--near", "3", "--far", "2"}, "does not lie before");
-  refused("x", {"--orbit", "2", "--near", "0"}, "more than 0");
+  refused("x", {"--orbit", "2", "--near", "3", "--far", "2"}, "must be less than");
+  refused("x", {"--orbit", "2", "--near", "0"}, "must be above 0");
   refused("x", {"--orbit", "2", "--background", "1,1"}, "--background");
   refused("x", {"--orbit", "2", "--target", "here"}, "--target");
   ExpectRefused(Render("x", {"--cameras", folder_ / "none.json"}), ErrorCode::kNotFound, {"none.json"});

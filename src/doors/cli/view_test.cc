@@ -106,7 +106,7 @@ TEST_F(ViewVerb, RefusesWhatMakesNoSense) {
   };
   const std::string cameras = Biplane() / "transforms_hr.json";
   refused({"--truth", folder_.path()}, ErrorCode::kBadArgument, "--cameras");
-  refused({"--truth", folder_.path(), "--cameras", cameras}, ErrorCode::kNotFound, "no picture has the name");
+  refused({"--truth", folder_.path(), "--cameras", cameras}, ErrorCode::kNotFound, "no picture is named as a camera");
   refused({"--truth", folder_ / "nowhere", "--cameras", cameras}, ErrorCode::kNotFound, "no such folder");
   refused({"--sh-degree", "4"}, ErrorCode::kBadArgument, "--sh-degree");
   refused({"--open-your-own", "javascript:alert(1)"}, ErrorCode::kBadArgument, "is no address");

@@ -141,7 +141,7 @@ TEST_F(Fits, NothingLeftIsAnError) {
   options_.densification.prune_opa = 0.4;
   const auto fitted = Fit(views_, Initial(), options_);
   ASSERT_FALSE(fitted.ok());
-  EXPECT_THAT(fitted.error().message, HasSubstr("no Gaussian"));
+  EXPECT_THAT(fitted.error().message, HasSubstr("removed every Gaussian"));
 }
 
 TEST(FitOptions, NumbersAreFinite) {

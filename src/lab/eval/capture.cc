@@ -26,8 +26,8 @@ Result<BenchmarkObject> OpenCapturedObject(const BenchmarkEntry& entry, const Ca
   object.hold_out = recipe.hold_out;
   object.downscale = recipe.downscale;
   object.camera_rule = CameraPixelRule::kAuto;
-  object.held_out = std::move(capture.held_out);
   object.low_cameras.cameras = capture.FittedViews();
+  object.held_out = std::move(capture.held_out);
   object.low_cameras.background = object.background;
   for (const Camera& camera : capture.low_views) object.low_intrinsics.push_back(camera.intrinsics);
   object.picture = [cameras = capture.views](size_t view) { return FullPicture(cameras.at(view)); };

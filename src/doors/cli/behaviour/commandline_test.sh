@@ -132,7 +132,7 @@ for bad in --scale=1,2,3 --scale=0 --scale=-1 --rotate=1,2 --mirror=w --up=0,0,0
   says stderr "${bad%%=*}"
 done
 expect 2 "weights" edit "$scan" "$work/bad.safetensors" --scale 2
-says stderr "edits and --dry-run are for splats"
+says stderr "edits and --dry-run work on splats"
 expect 2 "no value" edit "$scan" "$work/bad.ply" --translate
 expect 2 "an input among several" edit "$scan" "$work/back.ply" "$work/back.ply" -w
 expect 3 "one that is not there" edit "$scan" "$work/none.ply" "$work/bad.ply"

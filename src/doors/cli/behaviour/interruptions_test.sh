@@ -46,7 +46,7 @@ expect 5 "an interrupted fit is not forgotten" fit -o "$work/part.ply" --steps $
 expect 2 "an interrupted fit is not mistaken for another" resumed --seed 8
 says stderr "seed"
 expect 0 "an interrupted fit goes on" resumed
-says stderr "going on"
+says stderr "resuming"
 expect 0 "an interruption does not change the splat" cmp "$work/whole.ply" "$work/part.ply"
 rm -f "$work"/part.ply*
 
@@ -69,7 +69,7 @@ expect 4 "it does not go on from a damaged state" resumed
 says stderr "is damaged"
 cp "$work/checkpoint" "$work/part.ply.checkpoint"
 expect 0 "it goes on with what it began with" resumed
-says stderr "going on"
+says stderr "resuming"
 
 # A closed terminal: SIGHUP, from the shell and from the system, and nobody to read what is said.
 hung_up() {

@@ -192,7 +192,7 @@ TEST_F(EnhanceWithPublishedTest, LimitKeepsTheMostVisible) {
   ASSERT_TRUE(result.ok());
   ASSERT_EQ(result->cloud.size(), 10);
   EXPECT_EQ(result->report.over_limit, 50);
-  EXPECT_THAT(sink->messages, Contains(HasSubstr("only 10 of 60")));
+  EXPECT_THAT(sink->messages, Contains(HasSubstr("using 10 of 60")));
   EXPECT_NEAR(result->cloud.means[3], cloud.means[3], 1e-6) << "row 0 and then row 1";
 
   const auto upstream = EnhanceWithPublishedNetwork(cloud, IdentityNetwork(1), {.upstream = true, .max_gaussians = 10});

@@ -260,11 +260,10 @@ TEST_F(ConvertVerb, KeepsWhatAPlySaysBesideItsGaussians) {
                   .err,
               IsEmpty());
   EXPECT_TRUE(has_labels("filtered.ply"));
-  EXPECT_THAT(
-      ExpectDone({"enhance", extras, "-o", folder_ / "others.ply", "--method", "model", "--pixel-size", "0.4", "--mode",
-                  "classic"})
-          .err,
-      HasSubstr("extra properties dropped, as the Gaussians changed: label, normals"));
+  EXPECT_THAT(ExpectDone({"enhance", extras, "-o", folder_ / "others.ply", "--method", "model", "--pixel-size", "0.4",
+                          "--mode", "classic"})
+                  .err,
+              HasSubstr("extra properties dropped, as the Gaussians changed: label, normals"));
   EXPECT_FALSE(has_labels("others.ply"));
 }
 

@@ -9,6 +9,7 @@
 #include "cli/table.h"
 #include "cli/verb_tree.h"
 #include "core/text.h"
+#include "enhance/refine_options.h"
 #include "io/folder_for_test.h"
 
 namespace anchorsplat {
@@ -80,6 +81,20 @@ TEST(CommandLine, HelpOfEnhanceIsShortAndHelpAllHasGroups) {
   const std::string script = all.substr(all.find("\nPublished network, as its script runs it:\n"));
   for (const char* option : {"--compat", "--normalisation", "--attention-rounding", "--curve-depth", "--shuffles"}) {
     EXPECT_LT(script.find(option), script.find("\n\n", 1)) << option;
+  }
+}
+
+// What `eval` and the library take by name is what the command line declares.
+TEST(CommandLine, EveryOptionOfRefinementIsOneOfEnhance) {
+  const std::vector<DeclaredVerb> verbs = VerbsWithOptions();
+  const auto enhance = std::ranges::find(verbs, "enhance", &DeclaredVerb::name);
+  ASSERT_NE(enhance, verbs.end());
+  std::istringstream keys(RefineOptionKeys());
+  for (std::string key; keys >> key;) {
+    if (key.ends_with(',')) key.pop_back();
+    EXPECT_TRUE(std::ranges::any_of(enhance->options, [&](const DeclaredOption& option) {
+      return std::ranges::find(option.names, "--" + key) != option.names.end();
+    })) << key;
   }
 }
 

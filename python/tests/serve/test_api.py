@@ -170,7 +170,7 @@ def test_edits_that_make_no_sense(server: Server, edits: dict, says: str) -> Non
 
 def test_edits_that_this_splat_refuses(server: Server) -> None:
     for query, says in (
-        ({"filter_sphere": "90,0,0,1"}, "takes away the last 60 Gaussians"),
+        ({"filter_sphere": "90,0,0,1"}, "removes the last 60 Gaussians"),
         ({"filter_value": "label,gt,1"}, "splat: --filter-value label,gt,1: there is no property 'label'"),
     ):
         failed = server.wait(server.http.post("/v1/convert", params=query, content=SPLAT).json())

@@ -322,7 +322,7 @@ void AddConvert(CLI::App& app, Program& program) {
   flags->size.AddTo(verb);
   ShortenHelp(verb, {"--out-dir", "--to", "--sh-degree", "--min-opacity", "--max-gaussians", "--lod", "--report",
                      "--translate", "--rotate", "--scale", "--up", "--filter-box", "--filter-sphere",
-                     "--filter-floaters", "--dry-run", "--overwrite", "--quiet", "--json"});
+                     "--filter-floaters", "--action-axes", "--dry-run", "--overwrite", "--quiet", "--json"});
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunConvert(*flags, program); }; });
 }
 

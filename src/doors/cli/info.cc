@@ -60,7 +60,7 @@ void PrintTable(const SplatFindings& f) {
   }
   if (const auto up = UpOf(f.comments)) {
     std::cout << "  up           " << Number((*up)[0]) << " " << Number((*up)[1]) << " " << Number((*up)[2])
-              << " (from the comments)\n";
+              << " (from the comments; axes RDF)\n";
   }
   for (const auto& [name, value] : f.facts.all()) std::cout << "  " << name << "  " << value << "\n";
   if (!IsZero(f.origin)) {
@@ -76,7 +76,7 @@ void PrintTable(const SplatFindings& f) {
                              : "")
                 << Coordinate(s.bounds->min[a], f.origin[a]) << " to " << Coordinate(s.bounds->max[a], f.origin[a]);
     }
-    std::cout << "\n";
+    std::cout << " (axes RDF, for convert: --action-axes RDF)\n";
   }
   if (f.reading.ok()) {
     std::cout << "  training pixel  " << Number(f.reading->pixel) << " (likely " << Number(f.reading->low) << " to "

@@ -159,7 +159,7 @@ Result<std::vector<EditStep>> ApplyJob(const EditJob& job, std::span<EditedSplat
   if (std::ranges::any_of(splats, [](const EditedSplat& splat) { return splat.kept > 0; })) return steps;
   std::string last = "the input has no Gaussians";
   for (const EditStep& step : steps) {
-    if (step.taken > 0) last = Cat(step.action, " takes away the last ", WithThousands(step.taken), " Gaussians");
+    if (step.taken > 0) last = Cat(step.action, " removes the last ", WithThousands(step.taken), " Gaussians");
   }
   return Error{ErrorCode::kBadArgument, Cat(splats[0].name, ": ", last, ": nothing to write")};
 }

@@ -313,7 +313,7 @@ TEST(EditFiles, ErrorsNameTheActionAndTheFile) {
   EXPECT_THAT(error({{"--filter-value", "f_rest_9,gt,1"}}, folder / "o.ply"),
               HasSubstr("there is no property 'f_rest_9'"));
   EXPECT_THAT(error({{"--filter-sphere", "50,0,0,1"}}, folder / "o.ply"),
-              HasSubstr("--filter-sphere 50,0,0,1 takes away the last 20 Gaussians: nothing to write"));
+              HasSubstr("--filter-sphere 50,0,0,1 removes the last 20 Gaussians: nothing to write"));
   EXPECT_THAT(error({{"--scale", "2"}}, input), HasSubstr("a.ply"));
   EXPECT_THAT(error({{"--scale", "2"}}, folder / "o.txt"), HasSubstr("no extension of a splat format"));
 }

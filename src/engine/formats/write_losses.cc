@@ -89,7 +89,7 @@ std::string UpLoss(const SplatFormat& format, std::span<const std::string> comme
   const auto up = UpOf({comments.begin(), comments.end()});
   if (!up || *up == kUsualUp || format.comments != CommentPlace::kNone) return {};
   return Cat(AFileOf(format), " has no place for where up is, ", (*up)[0], " ", (*up)[1], " ", (*up)[2],
-             ": programs will take the usual axis for it (--coords of convert turns a splat)");
+             ": viewers assume the usual axis (convert --up turns the splat)");
 }
 
 // Without its tag, a splat is drawn as classic.

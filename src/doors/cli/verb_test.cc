@@ -87,7 +87,7 @@ TEST(CommandLine, HelpOfEnhanceIsShortAndHelpAllHasGroups) {
 // What `eval` and the library take by name is what the command line declares.
 TEST(CommandLine, EveryOptionOfRefinementIsOneOfEnhance) {
   const std::vector<DeclaredVerb> verbs = VerbsWithOptions();
-  const auto enhance = std::ranges::find(verbs, "enhance", &DeclaredVerb::name);
+  const auto enhance = std::ranges::find_if(verbs, [](const DeclaredVerb& verb) { return verb.name() == "enhance"; });
   ASSERT_NE(enhance, verbs.end());
   std::istringstream keys(RefineOptionKeys());
   for (std::string key; keys >> key;) {

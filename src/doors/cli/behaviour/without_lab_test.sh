@@ -5,7 +5,7 @@
 
 expect 0 "enhance" "$program" enhance "$input" --method filter -o "$work/out.ply"
 expect 0 "info" "$program" info "$work/out.ply"
-says stdout "gaussians"
+says stdout "Gaussians"
 expect 0 "compare" "$program" compare "$input" "$work/out.ply" --orbit 2 --size 32x32 --lpips if-there
 says stderr "LPIPS missing: this program was built without the lab"
 expect 3 "compare by LPIPS" "$program" compare "$input" "$work/out.ply" --orbit 2 --size 32x32 --lpips alex

@@ -78,6 +78,9 @@ void PrintReport(const TrainReport& r) {
 }
 
 Status RunTrain(TrainFlags& flags, const Program& program) {
+  if (flags.datasets.empty() && flags.captures.empty()) {
+    return Error{ErrorCode::kBadArgument, "nothing to train on: pass folders of data sets, or --captures FOLDER"};
+  }
   if (program.trainer.run == nullptr) return RunInTrainingProgram(program.words);
   TrainRequest& request = flags.request;
   request.datasets.assign(flags.datasets.begin(), flags.datasets.end());

@@ -78,6 +78,13 @@ TEST_F(TrainVerb, SaysWhatItDid) {
   EXPECT_EQ(json["validation"]["raw"]["lpips"], nullptr);
 }
 
+TEST_F(TrainVerb, TakesCapturesAlone) {
+  const std::string captures = folder_.path().string();
+  ASSERT_EQ(RunWords({"train", "--captures", captures, "--config", config_, "-o", "run"}, {Train}).code, 0);
+  EXPECT_EQ(asked.captures, captures);
+  EXPECT_TRUE(asked.datasets.empty());
+}
+
 TEST_F(TrainVerb, PassesFailuresOn) {
   answer = Error{ErrorCode::kBadFile, "recipe.toml: line 2: no"};
   const ProgramRun run = RunWords(Words({}), {Train});
@@ -96,6 +103,7 @@ TEST_F(TrainVerb, RefusesWhatMakesNoSense) {
   ExpectRefused({"train", "chairs", "-o", "run"}, ErrorCode::kBadArgument, {"--config"});
   ExpectRefused({"train", "chairs", "--config", folder_ / "none.toml", "-o", "run"}, ErrorCode::kBadArgument,
                 {"none.toml"});
+  ExpectRefused({"train", "--config", config_, "-o", "run"}, ErrorCode::kBadArgument, {"nothing to train on"});
   ExpectRefused(Words({"--steps", "0"}), ErrorCode::kBadArgument, {"--steps"});
   ExpectRefused(Words({"--minutes", "0"}), ErrorCode::kBadArgument, {"--minutes"});
 }

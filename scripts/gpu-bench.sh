@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# What a GPU takes for pictures and their gradients, beside the CPU and, where python3 has it, gsplat.
+# What a GPU takes for pictures and their gradients, beside the CPU and, where python3 has it, gsplat; then for a fit of 15,000 steps
+# at 256 x 256 and a refinement with pictures (200 and 20 steps with --small).
 #
 #   scripts/gpu-bench.sh [words of `anchorsplat bench gpu`]
 #   scripts/gpu-bench.sh --pack FOLDER [PROGRAM]     all that it takes on a Linux that reaches no registry, in a new folder:
@@ -20,6 +21,11 @@ pack() {
   mkdir -p "$folder/lib" "$folder/lib-compiler"
   cp "$here/gpu-bench.sh" "$here/gpu-bench-gsplat.py" "$folder/"
   cp "$program" "$folder/anchorsplat"
+  local name
+  for name in stone_lantern tankard; do
+    mkdir -p "$folder/examples/$name"
+    cp -r "$here/../examples/$name/"{lr,transforms_lr.json,input.ply} "$folder/examples/$name/"
+  done
   strip "$folder/anchorsplat"
   cp "$library" "$folder/libwgpu_native.so"
   cp -L "$loader" "$folder/lib/libvulkan.so.1"
@@ -46,6 +52,8 @@ if [ "${1:-}" = --pack ]; then
   exit
 fi
 
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
 if [ -x "$here/anchorsplat" ]; then
   program=$here/anchorsplat
   export ANCHORSPLAT_WEBGPU=${ANCHORSPLAT_WEBGPU:-$here/libwgpu_native.so}
@@ -54,29 +62,63 @@ if [ -x "$here/anchorsplat" ]; then
   export LD_LIBRARY_PATH=$path${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
   # A container is often given NVIDIA's driver without the file by which Vulkan finds it.
   if [ -z "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}" ] && ! ls /etc/vulkan/icd.d/*.json /usr/share/vulkan/icd.d/*.json >/dev/null 2>&1 &&
-    ldconfig -p 2>/dev/null | grep -q 'libGLX_nvidia\.so\.0 '; then
-    icd=$(mktemp -d)
-    trap 'rm -rf "$icd"' EXIT
-    echo '{"file_format_version": "1.0.0", "ICD": {"library_path": "libGLX_nvidia.so.0", "api_version": "1.3.0"}}' >"$icd/nvidia.json"
-    export VK_DRIVER_FILES=$icd/nvidia.json VK_ICD_FILENAMES=$icd/nvidia.json
+    { [ -d /usr/local/nvidia ] || ldconfig -p 2>/dev/null | grep -q 'libGLX_nvidia\.so\.0 '; }; then
+    driver=/usr/local/nvidia/share/vulkan/icd.d/nvidia_icd.json
+    if [ ! -e "$driver" ]; then
+      driver=$work/nvidia.json
+      echo '{"file_format_version": "1.0.0", "ICD": {"library_path": "libGLX_nvidia.so.0", "api_version": "1.3.0"}}' >"$driver"
+    fi
+    export VK_DRIVER_FILES=$driver VK_ICD_FILENAMES=$driver
   fi
 else
   program=$here/../build/anchorsplat
   [ -x "$program" ] || { echo "gpu-bench: there is no $program (make gpu-bench builds it)" >&2; exit 1; }
 fi
 
-code=0
-"$program" bench gpu "$@" || code=$?
-# The rows of gsplat, of the same splats. What concerns only our program is left out.
-words=() device=
-for word in "$@"; do
-  [ -z "$device" ] || { device=; continue; }
-  case "$word" in
-    --device | --max-gpu-memory) device=1 ;;
-    --device=* | --max-gpu-memory=*) ;;
-    *) words+=("$word") ;;
+# Seconds, share of the GPU and agreement with pictures, from a report of `fit` or `enhance`.
+summary='
+import json, sys
+title, report = sys.argv[1], json.load(sys.stdin)
+report = report[0] if isinstance(report, list) else report
+device, refined = report["device"], report.get("refine-images", {})
+held_out = report.get("held_out", {}).get("psnr") or refined.get("consistency_after")
+name = device["name"] if "share" not in device else "%s for %.0f %%" % (device["name"], 100 * device["share"])
+print("%s: %.1f s (%s), %.2f dB" % (title, report.get("seconds_in_all", report["seconds"]), name, held_out))
+if device.get("gave_up"): print("  gave up the GPU: " + device["gave_up"])
+'
+report_run() {
+  local title=$1
+  shift
+  "$program" "$@" "${where[@]}" --quiet --json >"$work/report.json" || return 1
+  if [ -n "$json" ]; then cat "$work/report.json"; else python3 -c "$summary" "$title" <"$work/report.json"; fi
+}
+
+# Words that say where, and words that say what, which the other program takes too.
+all=("$@") where=() what=() small='' json=''
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --device | --max-gpu-memory) where+=("$1" "${2:-}") && shift ;;
+    --device=* | --max-gpu-memory=*) where+=("$1") ;;
+    --small) small=1 what+=("$1") ;;
+    --json) json=1 what+=("$1") ;;
+    *) what+=("$1") ;;
   esac
+  shift || true
 done
-[[ " $* " == *" --json "* ]] || echo
-python3 "$here/gpu-bench-gsplat.py" "$program" "${words[@]}" || [ $? -eq 3 ] || code=1
+[[ " ${where[*]} " == *" --device"* ]] || where+=(--device gpu)
+
+code=0
+"$program" bench gpu "${all[@]}" || code=$?
+[ -n "$json" ] || echo
+python3 "$here/gpu-bench-gsplat.py" "$program" "${what[@]}" || [ $? -eq 3 ] || code=1
+
+examples=$here/examples
+[ -d "$examples" ] || examples=$here/../examples
+steps=15000 refine_steps=1500
+[ -z "$small" ] || steps=200 refine_steps=20
+[ -n "$json" ] || echo
+report_run "Fit, $steps steps at 256 x 256, 20,000 Gaussians" fit "$examples/stone_lantern/transforms_lr.json" -o "$work/fit.ply" \
+  --steps $steps --max-gaussians 20000 || code=1
+report_run "Refinement with 60 pictures, $refine_steps steps" enhance "$examples/tankard/input.ply" -o "$work/best.ply" --quality best \
+  --images "$examples/tankard/transforms_lr.json" --steps $refine_steps || code=1
 exit "$code"

@@ -107,6 +107,7 @@ TEST_F(ResidentFits, TakeAreasOfPixels) {
 
 TEST_F(ResidentFits, TakeOutExposures) {
   options_.exposure_from = 10;
+  options_.densification.refine_start_iter = 100;  // growing amplifies rounding errors
   ExpectAlike();
 }
 

@@ -29,7 +29,7 @@ Result<std::vector<CaptureFolder>> FindCaptures(const std::filesystem::path& fol
 struct CaptureRecipe {
   int downscale = 4;     // reduction factor of the fitted pictures
   int hold_out = 8;      // holds out every Nth view, unless the project names them
-  int64_t steps = 1000;  // of the fit; otherwise FitOptionsFor, with a far shell if the pictures need one
+  int64_t steps = 5000;  // of the fit; otherwise FitOptionsFor, with a far shell if the pictures need one
   uint64_t seed = 0;     // of the fit
 };
 

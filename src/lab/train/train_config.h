@@ -61,7 +61,7 @@ struct DataConfig {
 struct CapturesConfig {
   int downscale = 4;
   int hold_out = 4;                         // holds out every Nth view from the fit, to train the network
-  std::vector<int64_t> fit_steps = {1000};  // of each capture's fits
+  std::vector<int64_t> fit_steps = {5000};  // of each capture's fits
 
   bool operator==(const CapturesConfig&) const = default;
 };

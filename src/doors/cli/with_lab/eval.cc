@@ -176,7 +176,7 @@ void AddEval(CLI::App& app, Program& program) {
       ->excludes(methods)
       ->excludes(strength);
   verb.add_option("--fit-steps", flags->fit_steps,
-                  "Fit steps of 'bicubic' (default: 15000) and of --recipe real (default: 1000)")
+                  "Fit steps of 'bicubic' (default: 15000) and of --recipe real (default: 5000)")
       ->check(CLI::Range(int64_t{1}, int64_t{1'000'000}));
   verb.add_option("--split", flags->split, "Only objects of this split: train, validation or test");
   verb.add_option("--objects", flags->objects, "Only these objects, comma-separated")->delimiter(',');

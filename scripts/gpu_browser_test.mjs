@@ -23,7 +23,7 @@ function kernelsOfSources() {
     if (!file.endsWith('.cc') || file.endsWith('_test.cc')) continue;
     const text = fs.readFileSync(path.join(root, 'src', file), 'utf8');
     for (const [, entry, sources] of text.matchAll(/GpuKernel \w+\s*=?\s*\{\s*"(\w+)",\s*\{([^}]*)\}/g)) {
-      const room = path.join(root, 'src', file.split(path.sep)[0]);
+      const room = path.dirname(path.join(root, 'src', file)); // kernels lie beside what runs them
       const parts = sources.split(',').map((source) => {
         const embedded = /^wgsl::k(\w+)Wgsl$/.exec(source.trim());
         if (!embedded) return constantOf(text, source.trim());

@@ -76,7 +76,7 @@ def enhance(
     """Returns a splat that holds up when seen closer, and a :class:`Report`. `cloud` is not changed.
 
     method: "auto" (the best for what is given), one of :func:`methods`, or two such as "model+refine".
-    quality: how much time to spend, instead of a method: "fast", about a second; "good", several; "best", minutes with `images`.
+    quality: how much time to spend, instead of a method: "fast", about a second; "good", several; "best", minutes.
     upscale: zoom to prepare for, at least 1.
     max_gaussians: budget for the result, spent where the closer view shows it; 0: no limit. most_gaussians: its old name.
     region: enhance only this part, a box (x0, y0, z0, x1, y1, z1) or a sphere (x, y, z, radius) in world units. The rest

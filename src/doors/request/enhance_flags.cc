@@ -76,8 +76,8 @@ void AddMethodFlags(CLI::App& verb, EnhanceFlags& flags) {
   verb.add_option("--method", options.method, MethodHelp())->capture_default_str();
   verb.add_option("--quality", options.quality,
                   "How much time to spend. fast: filter or network, about a second. good: then a short refinement, "
-                  "several seconds. best: refinement against --images, minutes; without --images as good. Replaces "
-                  "--method")
+                  "several seconds. best: refinement against --images, or without them at the closer view's "
+                  "resolution, minutes. Replaces --method")
       ->check(CLI::IsMember({"fast", "good", "best"}));
   verb.add_option("--upscale", options.upscale, "Zoom to prepare for; at least 1")->capture_default_str();
   verb.add_option("--max-gaussians,--most-gaussians", options.max_gaussians,

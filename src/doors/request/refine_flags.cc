@@ -13,9 +13,10 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
           "Project with the training pictures (as for `fit`): the best reference for refinement")
       ->check(NotEmpty())
       ->group(group);
-  verb.add_option_function<std::string>("--enlarge-with", path(options.enlarge_with),
-                                        "With --method detail: network that enlarges the reference, a .safetensors of "
-                                        "scripts/fetch-upscaler.sh")
+  verb.add_option_function<std::string>(
+          "--enlarge-with", path(options.enlarge_with),
+          "With --method detail: network that adds detail to the reference, a .safetensors of "
+          "scripts/fetch-upscaler.sh")
       ->check(NotEmpty())
       ->group(group);
   verb.add_option("--hold-out", options.hold_out,

@@ -292,7 +292,7 @@ Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceI
   const bool closer = options.upscale > 1;
   const bool said = options.mode.has_value() || options.filter_strength.has_value();
   const std::string_view lost_nothing = options.filter_strength ? "" : LostNothing(cloud);
-  const bool stays = closer && !plan.method->invents;  // unchanged if there is no width to restore
+  const bool stays = closer && !plan.method->invents(options);  // unchanged if there is no width to restore
   if (!lost_nothing.empty() && stays) {
     SayTheSplatStays(options, Cat(lost_nothing, ". --filter-strength F enhances it anyway"));
   }

@@ -35,7 +35,7 @@ struct EnhanceOptions {
   // A, then B on its result, if B supports that (EnhanceMethod::takes_start).
   std::string method = "auto";
   // Alternative to `method`: "fast", an instant method; "good", that plus gentle refinement; "best", refinement with
-  // the pictures of refine.images, or "good" without pictures. Empty: `method` decides.
+  // the pictures of refine.images, or without pictures "detail". Empty: `method` decides.
   std::string quality;
   // Options the user set, by their command-line names ("filter-strength"). CheckOptions rejects those without effect.
   std::vector<std::string> given;
@@ -167,7 +167,8 @@ struct EnhanceMethod {
   // Whether, named alone, it starts from the best instant method's result, if that method adds detail.
   std::function<bool(const EnhanceOptions&)> starts_from_best = [](const EnhanceOptions&) { return false; };
   bool adds_detail = false;  // shows new detail, not just the splat's own at other widths
-  bool invents = false;      // adds detail that was never observed, so it applies even to splats that lost nothing
+  // Whether it adds detail that was never observed, so that it applies even to splats that lost nothing.
+  std::function<bool(const EnhanceOptions&)> invents = [](const EnhanceOptions&) { return false; };
   // Recognises this method's checkpoints and registers them as the command's own files. Null: writes no checkpoints.
   bool (*is_checkpoint)(const std::filesystem::path&) = nullptr;
   bool checkpoints_on_request = false;  // writes checkpoints only if one is named, or with --resume

@@ -71,14 +71,17 @@ EnlargedTargets::EnlargedTargets(RefineTargets low, std::shared_ptr<Upscaler> up
 
 Status EnlargedTargets::Make(int64_t view, const PixelBox& low_window) {
   ANCHORSPLAT_RETURN_IF_ERROR(low_.Load(view, low_window, low_target_));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(made_.picture, EnlargeBy(*upscaler_, low_target_.picture, factor_));
   const int u = factor_;
   const PixelBox window = {low_window.x0 * u, low_window.y0 * u, low_window.x1 * u, low_window.y1 * u};
   const Camera camera = Crop(views_[static_cast<size_t>(view)], window);
   ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(*still_, camera, render_, output_));
   Clamp01(output_.color);
-  for (size_t i = 0; i < made_.picture.pixels.size(); ++i) {
-    made_.picture.pixels[i] = std::lerp(output_.color.pixels[i], made_.picture.pixels[i], kNetworkShare);
+  made_.picture = output_.color;
+  if (upscaler_ != nullptr) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Image enlarged, EnlargeBy(*upscaler_, low_target_.picture, factor_));
+    for (size_t i = 0; i < enlarged.pixels.size(); ++i) {
+      made_.picture.pixels[i] = std::lerp(made_.picture.pixels[i], enlarged.pixels[i], kNetworkShare);
+    }
   }
   ANCHORSPLAT_RETURN_IF_ERROR(ProjectBack(low_target_.picture, made_.picture));
   made_.ignored.clear();

@@ -27,12 +27,13 @@ Status CheckFactor(int factor, int scale);
 // back-projection (Irani and Peleg 1991) with bicubic enlargement. Clamps to 0–1.
 Status ProjectBack(const Image& low, Image& enlarged);
 
-// Views u times larger than a refinement's. Each blends the network's enlargement (share kNetworkShare) with a
-// rendering of `start`, projected back onto the view so that at its own resolution it is unchanged. The network knows
-// how edges look but not what is there; the splat's share keeps detail on which all views agree.
+// Views u times larger than a refinement's: renderings of `start`, projected back onto the view so that at its own
+// resolution it is unchanged. With a network each is blended with the network's enlargement (share kNetworkShare)
+// before. The network knows how edges look but not what is there; the splat's share keeps detail on which all views
+// agree.
 class EnlargedTargets {
  public:
-  // `start`: the splat to refine. `render`: how it is rendered. `factor`: u.
+  // `upscaler`: null for none. `start`: the splat to refine. `render`: how it is rendered. `factor`: u.
   EnlargedTargets(RefineTargets low, std::shared_ptr<Upscaler> upscaler, int factor,
                   std::shared_ptr<const GaussianCloud> start, const RenderOptions& render);
 

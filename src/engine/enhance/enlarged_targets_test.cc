@@ -96,6 +96,21 @@ TEST(EnlargedTargets, LargeViewsGiveTheSameWindows) {
   EXPECT_LT(MeanDifference(there.picture, here.picture), 0.005);
 }
 
+TEST(EnlargedTargets, WithoutANetworkAreTheSplatsOwnViewProjectedBack) {
+  const BallViews views;
+  RefineTarget low, target;
+  RefineTargets own = views.Low();
+  ASSERT_TRUE(own.Load(1, kWhole, low).ok());
+  EnlargedTargets enlarged(views.Low(), nullptr, 3, views.ball, {});
+  ASSERT_TRUE(enlarged.Load(1, {0, 0, 3 * kWhole.x1, 3 * kWhole.y1}, target).ok());
+  Rasterizer rasterizer;
+  RenderOutput output;
+  ASSERT_TRUE(rasterizer.Render(*views.ball, RaysOf(PixelModel{3}, views.cameras[1]), {}, output).ok());
+  Clamp01(output.color);
+  ASSERT_TRUE(ProjectBack(low.picture, output.color).ok());
+  EXPECT_LT(MeanDifference(output.color, target.picture), 0.003) << "rounded to bytes";
+}
+
 TEST(CheckFactor, NamesWhatANetworkCannot) {
   for (const auto& [factor, scale] : {std::pair(1, 4), std::pair(2, 4), std::pair(4, 4), std::pair(6, 4)}) {
     EXPECT_TRUE(CheckFactor(factor, scale).ok()) << factor;
@@ -112,6 +127,7 @@ class Detail : public Refinement {
     options_.images.clear();
     options_.hold_out.reset();
     options_.steps = 30;
+    options_.enlarged = true;
     options_.enlarge_with = folder_ / "network.safetensors";
     ASSERT_TRUE(RepeatingForTest().Write(options_.enlarge_with).ok());
     input_.cameras = cameras_;
@@ -185,8 +201,38 @@ TEST_F(Detail, SaysThatItIsInvented) {
   options.upscale = kUpscale;
   options.refine.enlarge_with = folder_ / "none.safetensors";
   EXPECT_EQ(Enhance(input_.cloud, options).error().code, ErrorCode::kNotFound);
-  options.refine.enlarge_with.clear();
-  EXPECT_EQ(Enhance(input_.cloud, options).error().code, ErrorCode::kBadArgument);
+}
+
+TEST_F(Detail, InventsNothingWithoutANetwork) {
+  options_.enlarge_with.clear();
+  const auto refined = Refine(input_, options_, {});
+  ASSERT_TRUE(refined.ok()) << refined.error().message;
+  EXPECT_GT(refined->report.after, refined->report.before);
+  EXPECT_EQ(refined->cloud.size(), input_.cloud.size());
+
+  EnhanceOptions options;
+  options.method = "detail";
+  options.cameras = cameras_;
+  options.upscale = kUpscale;
+  options.refine = options_;
+  const auto enhanced = Enhance(input_.cloud, options);
+  ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
+  EXPECT_FALSE(IsInvented(enhanced->report));
+  options.filter_strength = 0;
+  const auto kept = Enhance(input_.cloud, options);
+  ASSERT_TRUE(kept.ok()) << kept.error().message;
+  ExpectSameCloud(kept->cloud, input_.cloud);
+}
+
+TEST_F(Detail, GoesOnWithoutANetworkOnlyIfItBeganSo) {
+  RefineControl control;
+  control.checkpoint = folder_ / "run.checkpoint";
+  control.checkpoint_every = 5;
+  options_.steps = 8;
+  ASSERT_TRUE(Refine(input_, options_, control).ok());
+  control.resume = true;
+  options_.enlarge_with.clear();
+  EXPECT_FALSE(Refine(input_, options_, control).ok());
 }
 
 }  // namespace

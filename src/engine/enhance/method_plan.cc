@@ -3,6 +3,7 @@
 
 #include "core/text.h"
 #include "enhance/enhance.h"
+#include "enhance/refine_method.h"
 
 namespace anchorsplat {
 
@@ -55,7 +56,10 @@ Result<MethodPlan> PlanQuality(const EnhanceOptions& options) {
     plan.method = BestInstant(options);
   } else {
     plan.start = StartWithDetail(options);
-    ANCHORSPLAT_ASSIGN_OR_RETURN(plan.method, FindMethod(options, pictures ? "refine-images" : "refine"));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(plan.method,
+                                 FindMethod(options, pictures ? "refine-images"
+                                                     : quality == "best" && CanEnlarge(options.upscale) ? "detail"
+                                                                                                        : "refine"));
   }
   if (options.method != "auto" && options.method != plan.Name()) {
     return Error{ErrorCode::kBadArgument, Cat(plan.chosen_by, " is --method ", plan.Name(),

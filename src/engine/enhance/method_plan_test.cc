@@ -64,7 +64,10 @@ TEST_F(Plan, QualityIsAMethodForThoseWhoKnowNone) {
     options_.quality = "good";
     EXPECT_EQ(Name(), network ? "sharpen+refine" : "refine");
     options_.quality = "best";
-    EXPECT_EQ(Name(), network ? "sharpen+refine" : "refine");
+    EXPECT_EQ(Name(), network ? "sharpen+detail" : "detail");
+    options_.upscale = 2.5;
+    EXPECT_EQ(Name(), network ? "sharpen+refine" : "refine") << "only whole pixels can be enlarged";
+    options_.upscale = 4;
     options_.refine.images = "pictures";
     EXPECT_EQ(Name(), network ? "sharpen+refine-images" : "refine-images");
     for (const char* without : {"fast", "good"}) {

@@ -240,7 +240,7 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
   if (plan.nothing_to_do) return timed(KeptStart(WithoutLast(std::move(start), input.fixed), std::move(report)));
   report.copies = *plan.options.copies;
   double upscale = input.upscale;
-  if (!plan.options.enlarge_with.empty()) {
+  if (plan.options.enlarged) {
     ANCHORSPLAT_RETURN_IF_ERROR(EnlargeViews(plan.options.enlarge_with, static_cast<int>(upscale), start, views));
     upscale = 1;
     ANCHORSPLAT_ASSIGN_OR_RETURN(report.plan.start,

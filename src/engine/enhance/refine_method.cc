@@ -37,7 +37,7 @@ void AddFacts(const RefineReport& r, StepReport& report) {
   if (r.input_psnr) report.facts.emplace_back("input_psnr", *r.input_psnr);
 }
 
-Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& options, StepReport& report) {
+Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& options, bool enlarged, StepReport& report) {
   if (options.upscale > kMostSamples) {
     return Error{ErrorCode::kBadArgument,
                  Cat("--upscale ", options.upscale, " is too much for refinement; the most is ", kMostSamples)};
@@ -65,8 +65,8 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
   // At most what the closer view's own pixels add.
   const std::optional<RenderMode> mode = input.cloud.render_mode;
   const bool lost_none = input.filter_strength <= ShownStrength(options.upscale, mode);
-  const bool detail = !options.refine.enlarge_with.empty();
-  if ((lost_none || IsCompensated(mode)) && options.refine.images.empty() && !detail) {
+  const bool invents = !options.refine.enlarge_with.empty();
+  if ((lost_none || IsCompensated(mode)) && options.refine.images.empty() && !invents) {
     RefinePlan& plan = report.plan.emplace();
     plan.options = options.refine;
     plan.nothing_to_do = true;
@@ -91,11 +91,19 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
     ANCHORSPLAT_RETURN_IF_ERROR(Append(refine.start, rest));
   }
   RefineOptions how = options.refine;
+  how.enlarged = enlarged;
   if (options.background) how.background = options.background;
   ANCHORSPLAT_ASSIGN_OR_RETURN(Refined refined, Refine(std::move(refine), how, options.control));
   AddFacts(refined.report, report);
-  if (detail) report.facts.emplace_back("invented", !refined.report.kept_start);
+  if (invents) report.facts.emplace_back("invented", !refined.report.kept_start);
   return std::move(refined.cloud);
+}
+
+Result<GaussianCloud> RunPlain(EnhanceInput input, const EnhanceOptions& options, StepReport& report) {
+  return RunRefine(std::move(input), options, false, report);
+}
+Result<GaussianCloud> RunEnlarged(EnhanceInput input, const EnhanceOptions& options, StepReport& report) {
+  return RunRefine(std::move(input), options, true, report);
 }
 
 bool HasImages(const MethodUse& use) { return !use.options.refine.images.empty(); }
@@ -164,25 +172,22 @@ EnhanceMethod RefineMethod() {
           .options = RefinementOptions(),
           .expected_gaussians = Expected,
           .ready = [](const EnhanceOptions& options) { return Validate(options.refine); },
-          .run = RunRefine};
+          .run = RunPlain};
 }
+
+bool CanEnlarge(double upscale) { return upscale >= 1 && upscale <= kMostSamples && upscale == std::floor(upscale); }
 
 namespace {
 
 // Also reads the network file, so that errors appear before any work.
 Status CheckDetail(const EnhanceOptions& options) {
-  const std::filesystem::path& file = options.refine.enlarge_with;
-  if (file.empty()) {
-    return Error{ErrorCode::kBadArgument,
-                 "the method 'detail' needs --enlarge-with FILE, a network that enlarges pictures "
-                 "(scripts/fetch-upscaler.sh fetches one)"};
-  }
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(options.refine));
-  if (!(options.upscale <= kMostSamples) || options.upscale != std::floor(options.upscale)) {
+  if (!CanEnlarge(options.upscale)) {
     return Error{ErrorCode::kBadArgument, Cat("--upscale ", options.upscale,
                                               ": the method 'detail' needs a whole number from 1 to ", kMostSamples)};
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Upscaler network, Upscaler::Read(file));
+  if (options.refine.enlarge_with.empty()) return {};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Upscaler network, Upscaler::Read(options.refine.enlarge_with));
   return CheckFactor(static_cast<int>(options.upscale), network.info().scale);
 }
 
@@ -193,16 +198,18 @@ EnhanceMethod DetailMethod() {
   std::erase_if(looked_at, [](const MethodOption& option) { return option.name.ends_with("-from"); });  // uses all rays
   looked_at.push_back({"enlarge-with", {}});
   return {.name = "detail",
-          .summary = "refine against views enlarged by --enlarge-with; invents detail",
+          .summary =
+              "refine against views at the closer view's resolution; minutes. With --enlarge-with it invents "
+              "detail",
           .rank = -1,
           .takes_start = true,
           .starts_from_best = [](const EnhanceOptions&) { return true; },
-          .invents = true,
+          .invents = [](const EnhanceOptions& options) { return !options.refine.enlarge_with.empty(); },
           .is_checkpoint = IsFitCheckpoint,
           .options = std::move(looked_at),
           .expected_gaussians = Expected,
           .ready = CheckDetail,
-          .run = RunRefine};
+          .run = RunEnlarged};
 }
 
 EnhanceMethod RefineImagesMethod() {
@@ -218,7 +225,7 @@ EnhanceMethod RefineImagesMethod() {
             if (!options.refine.images.empty()) return Validate(options.refine);
             return Error{ErrorCode::kBadArgument, "the method 'refine-images' needs --images PROJECT"};
           },
-          .run = RunRefine};
+          .run = RunPlain};
 }
 
 }  // namespace anchorsplat

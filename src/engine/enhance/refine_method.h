@@ -5,9 +5,13 @@
 namespace anchorsplat {
 
 // The methods "refine" (with pictures if options.refine.images is set), "refine-images" (requires pictures) and
-// "detail" (requires options.refine.enlarge_with), for the list in enhance/enhance.h.
+// "detail" (against enlarged views, with a network if options.refine.enlarge_with is set), for the list in
+// enhance/enhance.h.
 EnhanceMethod RefineMethod();
 EnhanceMethod DetailMethod();
 EnhanceMethod RefineImagesMethod();
+
+// Whether "detail" supports this zoom: whole numbers from 1 to kMostSamples.
+bool CanEnlarge(double upscale);
 
 }  // namespace anchorsplat

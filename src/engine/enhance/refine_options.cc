@@ -118,7 +118,7 @@ std::string ToJsonText(const RefineOptions& o) {
       {"align", o.align},
   };
   if (o.downscale > 1) json["downscale"] = o.downscale;
-  if (!o.enlarge_with.empty()) json["enlarged"] = true;
+  if (o.enlarged) json["enlarged"] = true;
   if (!o.images.empty()) json["split"] = "by residual";
   return json.dump();
 }

@@ -17,8 +17,8 @@ namespace anchorsplat {
 // start, and on the number of Gaussians.
 struct RefineOptions {
   std::filesystem::path images;  // project with the training pictures (fit/training_views.h); empty: none
-  // Network file (upscale/upscaler.h) that enlarges the target views, be they pictures or renders
-  // (enhance/enlarged_targets.h). Empty: not enlarged.
+  bool enlarged = false;         // the target views are u times larger (enhance/enlarged_targets.h)
+  // With `enlarged`: network file (upscale/upscaler.h) that adds detail to them. Empty: they show the start's.
   std::filesystem::path enlarge_with;
   WorldOrigin origin = {0, 0, 0};  // of the splat's means, for the pictures' cameras; set by Enhance()
   // Background behind the splat and the pictures' alpha. Unset: from the cameras' file, else from the splat's comment

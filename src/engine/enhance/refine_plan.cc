@@ -29,7 +29,6 @@ bool HasPictures(const RefineOptions& options) { return !options.images.empty();
 bool IsGentle(const RefineInput& input, const RefineOptions& options) {
   return !HasPictures(options) && input.start_has_detail;
 }
-bool IsDetail(const RefineOptions& options) { return !options.enlarge_with.empty(); }
 
 // Copies per Gaussian within `max_gaussians`: the last `fixed` stay single, the rest goes to the largest opacity ×
 // size. Empty if there is room for all.
@@ -70,13 +69,13 @@ Result<RefineOptions> ChooseRefineOptions(const RefineInput& input, const Refine
   }
   RefineOptions options = given;
   if (!options.seconds) {
-    options.steps = given.steps.value_or(IsDetail(given) ? kStepsOfDetail
-                                         : pictures      ? kStepsWithPictures
-                                         : gentle        ? kStepsGentle
-                                                         : kStepsWithout);
+    options.steps = given.steps.value_or(given.enlarged ? kStepsOfDetail
+                                         : pictures     ? kStepsWithPictures
+                                         : gentle       ? kStepsGentle
+                                                        : kStepsWithout);
   }
-  options.rate = given.rate.value_or(IsDetail(given) ? kRateOfDetail : gentle ? kRateGentle : kRate);
-  if ((gentle || IsDetail(given)) && !given.copies) options.copies = 1;
+  options.rate = given.rate.value_or(given.enlarged ? kRateOfDetail : gentle ? kRateGentle : kRate);
+  if ((gentle || given.enlarged) && !given.copies) options.copies = 1;
   return options;
 }
 
@@ -101,7 +100,7 @@ Result<RefinePlan> PlanRefinement(const RefineInput& input, const GaussianCloud&
       plan.from_input = true;
       plan.least_gain = kGainOverFine;
     }
-  } else if (plan.start.psnr >= kIndistinguishable && !IsDetail(chosen)) {
+  } else if (plan.start.psnr >= kIndistinguishable && chosen.enlarge_with.empty()) {
     plan.why = "nothing to refine: the start already matches the splat";
     plan.nothing_to_do = true;
     return plan;

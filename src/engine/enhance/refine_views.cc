@@ -113,8 +113,11 @@ Result<RefineViews> OpenRefineViews(const RefineInput& input, const RefineOption
 }
 
 Status EnlargeViews(const std::filesystem::path& file, int factor, const GaussianCloud& start, RefineViews& views) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(Upscaler network, Upscaler::Read(file));
-  const auto shared = std::make_shared<Upscaler>(std::move(network));
+  std::shared_ptr<Upscaler> shared;
+  if (!file.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(Upscaler network, Upscaler::Read(file));
+    shared = std::make_shared<Upscaler>(std::move(network));
+  }
   const auto splat = std::make_shared<const GaussianCloud>(start);
   for (RefineTargets* targets : {&views.train, &views.check}) {
     *targets =

@@ -1,6 +1,5 @@
-"""What goes wrong, as exceptions of one family. Every message is the command line's: one sentence with the file, the byte or
-line, the property and what was expected. Settings are called as the command line calls them ("--pixel-size" is
-``pixel_size=``)."""
+"""Exceptions. Messages are those of the command line: one sentence with the file, the byte or line, the property and what was
+expected. Settings have the names of its options ("--pixel-size" is ``pixel_size=``)."""
 
 
 class Error(Exception):

@@ -1,4 +1,4 @@
-"""Where the package wgpu has the library that speaks WebGPU: ``pip install 'anchorsplat[gpu]'`` brings it."""
+"""Finds the WebGPU library of the package wgpu, which ``pip install 'anchorsplat[gpu]'`` installs."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from . import _core
 
 
 def _folder() -> str:
-    """The package is looked for, not imported."""
+    """Finds the package without importing it."""
     try:
         found = importlib.util.find_spec("wgpu")
-    except (ImportError, ValueError):  # of a module that somebody has put into sys.modules by hand
+    except (ImportError, ValueError):  # a module put into sys.modules by hand
         found = None
     if found is not None and found.submodule_search_locations:
         return os.path.join(found.submodule_search_locations[0], "resources")
@@ -22,5 +22,5 @@ def _folder() -> str:
 
 @functools.cache
 def tell_library() -> None:
-    """The engine looks there first."""
+    """Tells the engine to look there first."""
     _core.set_gpu_folder(os.fsencode(_folder()))

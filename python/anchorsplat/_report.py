@@ -1,4 +1,4 @@
-"""What a call has done."""
+"""Reports of calls."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Any
 
 
 class Report(Mapping[str, Any]):
-    """What was done, with the names and values of the command line's ``--json``: a mapping that is read only.
+    """What a call did: a read-only mapping with the names and values of the command line's ``--json``.
 
-    ``report["method"]``, ``report["gaussians"]["out"]``, ``report["seconds"]``; ``dict(report)`` for the whole.
+    ``report["method"]``, ``report["gaussians"]["out"]``, ``report["seconds"]``; ``dict(report)`` for all of it.
     """
 
     __slots__ = ("_values",)

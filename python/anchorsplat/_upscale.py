@@ -30,13 +30,13 @@ def upscale(
     """Enlarges pictures [V,H,W,C] or [H,W,C] with 3 or 4 channels, uint8 or floats from 0 to 1: float32 of as many
     dimensions, from 0 to 1. What the network adds is invented: likely, not seen. The same bits for any number of threads.
 
-    `network`: a .safetensors as scripts/fetch-upscaler.sh makes it.
+    `network`: a .safetensors of scripts/fetch-upscaler.sh.
 
-    factor: how many times larger, a power of the network's own, which it is by default.
-    background: r, g, b from 0 to 1 that pictures with alpha are enlarged over, otherwise black.
-    alpha: how the fourth channel is enlarged; "bicubic" takes half the time and has softer edges.
+    factor: enlargement, a power of the network's factor; default: the network's factor.
+    background: r, g, b from 0 to 1 behind pictures with alpha; default: black.
+    alpha: how to enlarge the fourth channel; "bicubic" takes half the time and has softer edges.
 
-    Raises BadFileError for a file that is no such network, BadArgumentError for other shapes and factors.
+    Raises BadFileError if the file is not such a network, BadArgumentError for other shapes and factors.
     """
     array = _pictures("pictures", pictures)
     words = [b"--network=" + path_bytes(network), *words_of(upscale, locals())]

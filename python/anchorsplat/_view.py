@@ -1,4 +1,4 @@
-"""The page that shows a splat."""
+"""HTML pages that show a splat."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ._words import path_bytes, words_of
 
 
 class Page:
-    """One HTML file that shows a splat in any browser with WebGL 2, without a network. A notebook shows it inline."""
+    """One HTML file that shows a splat in any browser with WebGL 2, offline. A notebook shows it inline."""
 
     __slots__ = ("_bytes",)
 
@@ -26,11 +26,11 @@ class Page:
 
     @property
     def html(self) -> str:
-        """The whole of it."""
+        """The HTML text."""
         return self._bytes.decode()
 
     def save(self, path: PathLike, *, overwrite: bool = False) -> None:
-        """Writes it, whole or not at all. Raises ExistsError unless `overwrite`, NotFoundError (the folder), IoError."""
+        """Writes the page, whole or not at all. Raises ExistsError unless `overwrite`, NotFoundError (the folder), IoError."""
         with run() as how:
             _core.write_file(path_bytes(path), self._bytes, overwrite, how)
 

@@ -42,19 +42,17 @@ def enhance(
     progress: ProgressLike = False,
     **options: Any,
 ) -> BatchReport:
-    """Enhances every input into the folder `out`, and says in the manifest what became of it. Called again it makes what
-    is missing or has changed.
+    """Enhances every input into the folder `out` and records each in the manifest. Called again, it makes only what is missing
+    or has changed.
 
-    `inputs` are paths, URLs of fsspec or patterns; `lists` are text files of them. `options` are those of
-    ``anchorsplat enhance``, as keywords: ``upscale=4``, ``cameras="{folder}/transforms.json"``, ``clean=True``. The rest is
-    the same as on the command line (``anchorsplat batch enhance --help``). `progress`: True for lines on stderr, or
-    what other functions take: a class such as tqdm.tqdm, a bar, a function that is called with a
-    :class:`anchorsplat.Progress`.
+    `inputs` are paths, fsspec URLs or patterns; `lists` are text files of them. `options` are the options of
+    ``anchorsplat enhance`` as keywords: ``upscale=4``, ``cameras="{folder}/transforms.json"``, ``clean=True``. The other
+    arguments are those of the command line (``anchorsplat batch enhance --help``). `progress`: True for lines on stderr, or as
+    for other functions: a class such as tqdm.tqdm, a bar, or a function that is called with a :class:`anchorsplat.Progress`.
 
-    What goes wrong with an input is no exception but a row: ``report.failures``. Raises BadArgumentError for options and
-    inputs that make no sense, before any work; ExistsError where results would replace files that no batch made;
-    NotFoundError for a pattern that nothing matches; IoError when the manifest is lost or the cluster is not there; Stopped, a
-    KeyboardInterrupt, on Ctrl-C.
+    A failed input is a row in ``report.failures``, not an exception. Raises, before any work, BadArgumentError for invalid
+    options and inputs; ExistsError if results would replace files that no batch made; NotFoundError if a pattern matches
+    nothing; IoError if the manifest is lost or the cluster cannot be reached; Stopped, a KeyboardInterrupt, on Ctrl-C.
     """
     return run_splats(
         _words(inputs),
@@ -71,8 +69,8 @@ def enhance(
 
 
 def refine(inputs: Inputs, out: str | PathLike[str], *, method: str = "refine", **options: Any) -> BatchReport:
-    """enhance() by optimisation: minutes for each splat. One that Ctrl-C interrupts goes on from its checkpoint the next time,
-    where `out` is a folder."""
+    """enhance() with the method refine, which takes minutes per splat. After Ctrl-C the next call resumes from checkpoints, if
+    `out` is a folder."""
     return enhance(inputs, out, method=method, **options)
 
 

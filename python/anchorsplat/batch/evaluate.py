@@ -18,8 +18,8 @@ from .report import BatchReport
 
 def evaluate(benchmark: str, out: str, options: Sequence[str], how: How, *, overwrite: bool = False, json: bool = False,
              memory: int = 2 << 30, tables: Any = None) -> tuple[BatchReport, int]:  # fmt: skip
-    """Measures and lets `anchorsplat eval` write and print the tables: to `tables`, a file object, else to stdout. Its exit
-    code is the second result. Raises Stopped when interrupted; the same command goes on."""
+    """Measures, then lets `anchorsplat eval` write and print the tables, to the file object `tables` or to stdout. The second
+    result is its exit code. Raises Stopped when interrupted; the same command continues."""
     begin = time.monotonic()
     how.check()
     source, target = shared_folder(benchmark), shared_folder(out)
@@ -51,7 +51,7 @@ def evaluate(benchmark: str, out: str, options: Sequence[str], how: How, *, over
                              "--json", "--threads", str(how.threads), *(["-w"] if overwrite else [])]  # fmt: skip
                 jobs.append(ProcessJob(label, tuple(arguments), engine(), target, shared.token))
         counts = run_processes(lambda: iter([jobs]), len(jobs), how, done, what="eval", memory=memory)
-    # Everything is there now but what failed, which is tried once more: so the tables name the reason.
+    # Only failed pairs are missing now. They are retried once, so that the tables give the reason.
     last = subprocess.run(
         [program(), "eval", source, "-o", target, *options, *(["--json"] if json else [])],
         stdout=tables, stderr=None if failures or not how.quiet else subprocess.DEVNULL,
@@ -61,7 +61,7 @@ def evaluate(benchmark: str, out: str, options: Sequence[str], how: How, *, over
 
 
 def _begin_with(part: Path, results: Path, method: str) -> None:
-    """What an earlier run has of this pair: results that stand are not measured again, fits go on."""
+    """Copies files of this pair from an earlier run: finished results are kept, fits resume."""
     part.mkdir(parents=True, exist_ok=True)
     for there in results.iterdir():
         mine = there.name == "truth.png" or there.name == method or there.name.startswith(f"{method}.")

@@ -1,4 +1,4 @@
-"""How far a batch is: one line that changes on a terminal, a line every now and then in a log."""
+"""Progress of a batch: one updated line on a terminal, an occasional line in a log."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from .._run import Progress as Told
 
 Show = Callable[[Told], object]
 
-_ON_TERMINAL = 0.2  # seconds between two states of the line
+_ON_TERMINAL = 0.2  # seconds between updates of the line
 _IN_LOG = 15.0
 
 
 @dataclass
 class Counts:
-    """What became of the inputs of one run."""
+    """Counts of the inputs of one run."""
 
     total: int = 0
     done: int = 0
     failed: int = 0
-    skipped: int = 0  # there already, as they are wanted
+    skipped: int = 0  # already up to date
 
     @property
     def left(self) -> int:
@@ -41,7 +41,7 @@ def duration(seconds: float) -> str:
 
 class Progress:
     def __init__(self, what: str, counts: Counts, *, quiet: bool = False, stream: TextIO | None = None, show: Show | None = None):
-        """`show` is called instead of writing to the stream."""
+        """`show` replaces writing to the stream."""
         self._what, self._counts, self._quiet, self._show_to = what, counts, quiet, show
         self._stream = stream or sys.stderr
         self._terminal = self._stream.isatty()
@@ -79,7 +79,7 @@ class Progress:
         return Told(self._what, c.total - c.left, c.total, f"{c.failed:,} failed" if c.failed else "", ended)
 
     def message(self, text: str) -> None:
-        """A line that stays."""
+        """Prints a permanent line."""
         if self._terminal and self._shown and not self._quiet:
             self._stream.write("\r\x1b[K")
             self._shown = ""
@@ -100,5 +100,5 @@ class Progress:
 
 
 def printable(text: str) -> str:
-    """Names of files and what programs said about them, with nothing in it that commands a terminal."""
+    """Text with terminal controls escaped."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape", "backslashreplace").decode() for c in text)

@@ -1,4 +1,4 @@
-"""What a batch came to."""
+"""Report of a batch."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from .progress import Counts, duration
 
 @dataclass
 class BatchReport:
-    """Counts of one run. `failures` are the rows of those that failed in it, as they stand in the manifest."""
+    """Counts of one run. `failures` are the manifest rows of its failed inputs."""
 
     total: int
     done: int
     failed: int
-    skipped: int  # there already, as they are wanted
+    skipped: int  # already up to date
     seconds: float
     manifest: str
     failures: list[dict[str, Any]] = field(default_factory=list, repr=False)
-    start_seconds: float = 0.0  # of `seconds`, those until Ray was there
+    start_seconds: float = 0.0  # part of `seconds` until Ray was ready
     gaussians_in: int = 0
     gaussians_out: int = 0
 
     @property
     def exit_code(self) -> int:
-        """0: all there; 1: not all; that of the last failure where nothing could be done (docs/cli.md)."""
+        """0: all done; 1: some failed; the code of the last failure if all failed (docs/cli.md)."""
         if self.failed == 0:
             return 0
         if self.failed < self.total or not self.failures:

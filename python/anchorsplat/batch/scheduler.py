@@ -1,4 +1,4 @@
-"""Keeps a bounded number of Ray tasks going, and tells what became of each."""
+"""Keeps a bounded number of Ray tasks running and reports each result."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from typing import Any
 from .._errors import IoError
 from .task import failed
 
-_LOOK = 1.0  # seconds that a wait lasts at most
-_COUNT_MACHINES = 5.0  # seconds between two looks at how large the cluster is
-_TO_STOP = 40.0  # seconds that tasks have to end in good order
+_LOOK = 1.0  # longest wait, seconds
+_COUNT_MACHINES = 5.0  # seconds between checks of the cluster size
+_TO_STOP = 40.0  # seconds for tasks to stop cleanly
 
 
 class Stopped(KeyboardInterrupt):
-    """Ctrl-C, SIGTERM or SIGHUP; tasks were ended, and what was done is in the manifest."""
+    """Ctrl-C, SIGTERM or SIGHUP. Tasks were stopped; finished results are in the manifest."""
 
 
 @contextlib.contextmanager
 def signals_interrupt() -> Iterator[None]:
-    """SIGTERM and SIGHUP are Ctrl-C."""
+    """Treats SIGTERM and SIGHUP as Ctrl-C."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -49,7 +49,7 @@ def run_tasks(
     ended: Callable[[Any, dict[str, Any]], None],
     in_flight: Callable[[], int],
 ) -> None:
-    """Submits jobs while fewer than in_flight() are under way, and calls `ended(job, row)` for each that has ended.
+    """Submits jobs while fewer than in_flight() are running, and calls `ended(job, row)` when one ends.
 
     A task whose worker died more often than Ray was told to try again ends as a failed row. Raises Stopped when
     interrupted: tasks under way get a KeyboardInterrupt, and those that end nevertheless have their row. IoError: the
@@ -73,7 +73,7 @@ def run_tasks(
                 return
             _collect(ray, running, ended, _LOOK)
     except KeyboardInterrupt:
-        with contextlib.suppress(KeyboardInterrupt):  # a second one: at once
+        with contextlib.suppress(KeyboardInterrupt):  # a second one stops at once
             for ref in running:
                 ray.cancel(ref, force=False)
             until = time.monotonic() + _TO_STOP

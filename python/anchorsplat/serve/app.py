@@ -32,7 +32,7 @@ _TYPES = {
     ".svg": "image/svg+xml",
     ".wasm": "application/wasm",
 }
-#: With these a browser lets the page use threads.
+#: Headers that let a page use threads.
 _ISOLATED = {"cross-origin-opener-policy": "same-origin", "cross-origin-embedder-policy": "require-corp"}
 _PAGES = {"/": "index.html", "/docs": "api.html"}
 _SUMMARIES = {
@@ -43,7 +43,7 @@ _SUMMARIES = {
 
 
 def read_static(folder: Path) -> dict[str, tuple[bytes, str]]:
-    """All of it, once: no path of a request is ever opened."""
+    """Reads all files once, so that no path of a request is ever opened."""
     return {path.name: (path.read_bytes(), _TYPES[path.suffix]) for path in folder.iterdir() if path.suffix in _TYPES}
 
 
@@ -56,7 +56,7 @@ def make_runner(settings: Settings, engine: Engine) -> Runner:
 
 
 def make_app(settings: Settings):
-    """An ASGI application. Raises DataInUse, EngineMissing. `app.service` is what it works with."""
+    """The ASGI application, with its service in `app.service`. Raises DataInUse, EngineMissing."""
     engine = Engine(find_program(), settings)
     store, metrics = Store(settings.data), Metrics()
     static = read_static(Path(__file__).with_name("static"))
@@ -115,7 +115,7 @@ def _page(body: bytes):
 
 
 def _add_web(app: FastAPI, web: dict[str, tuple[bytes, str]], static: dict[str, tuple[bytes, str]]) -> None:
-    """The page that works without uploads, and links to it."""
+    """Serves the page that works without uploads, and links to it."""
     body, media = static["index.html"]
     link = b'<a href="/web/">Without upload</a> '
     static["index.html"] = body.replace(b'<a href="/docs">', link + b'<a href="/docs">'), media

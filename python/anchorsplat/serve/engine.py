@@ -1,4 +1,4 @@
-"""The native program: where it is, what words make it do a job, and what its end means."""
+"""The native program: its path, the words for a job, and the meaning of its exit."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from . import options as asked
 from .process import Limits, Outcome
 from .settings import Settings
 
-#: Of --json of the program, where a file cannot be read; docs/cli.md has the exit codes.
+#: Error codes in the program's --json for unreadable files (docs/cli.md).
 BAD_ARGUMENT, BAD_FILE, IO = 2, 4, 6
 
 
 class EngineMissing(Exception):
-    """There is no native program to run."""
+    """The native program is missing."""
 
 
 def find_program() -> Path:
-    """The one of this package, unless ANCHORSPLAT_PROGRAM names another."""
+    """Path of this package's program, or of ANCHORSPLAT_PROGRAM."""
     named = os.environ.get("ANCHORSPLAT_PROGRAM")
     candidate = named or bundled_program()
     if os.access(candidate, os.X_OK) and os.path.isfile(candidate):
@@ -31,7 +31,7 @@ def find_program() -> Path:
 
 
 def fingerprint_of(program: Path) -> str:
-    """Results of another build are other results."""
+    """Identity of the build, as other builds give other results."""
     with open(program, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()[:16]
 
@@ -55,7 +55,7 @@ class Engine:
         return ["--json", "--progress", "json", "--threads", str(self._settings.threads)]
 
     def check(self, source: str, hint: str) -> list[str]:
-        """Reads all of a splat and writes one Gaussian of it: whether it is one, of what format and size."""
+        """Words that check a splat and find its format and size: they read all and write one Gaussian."""
         return [
             "convert",
             source,
@@ -67,7 +67,7 @@ class Engine:
         ]
 
     def job(self, kind: str, options: asked.Options, source: str, hint: str, cameras: bool) -> list[str]:
-        """Words for a job. Its files get names of ours only, in the folder that it runs in."""
+        """Words for a job. Its files have generated names in its folder."""
         if isinstance(options, asked.EnhanceOptions):
             resume = ["--resume", "--checkpoint", "state"] if options.quality == "good" else []
             return ["enhance", source, "-o", "result.ply", *options.words(cameras), *resume, *self._shared()]
@@ -86,7 +86,7 @@ class Engine:
         return ["view", after, *sides, "-o", "view.html", "--title", title, *self._shared()]
 
     def explain(self, outcome: Outcome, name: str = "the splat") -> tuple[str, str]:
-        """Code and sentence for an outcome that is not done."""
+        """Error code and message of a failed outcome."""
         s = self._settings
         memory = f"{s.max_memory / 2**30:.3g} GiB"
         if outcome.why == "timeout":
@@ -117,5 +117,5 @@ class Engine:
 
 
 def _without_dash(message: str, name: str) -> str:
-    """Messages call standard input "-"; people know the file by its name."""
+    """Replaces "-", standard input, by the file's name."""
     return name + message[1:] if message.startswith("-:") else message

@@ -1,4 +1,4 @@
-"""What GET /metrics says, for Prometheus."""
+"""GET /metrics, for Prometheus."""
 
 from __future__ import annotations
 

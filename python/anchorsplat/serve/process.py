@@ -1,4 +1,4 @@
-"""A program in a process of its own, with limits: what every job runs in, here and on Ray."""
+"""Runs the program of a job in a process with limits, here and on Ray."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any
 
 _LAUNCH = Path(__file__).with_name("launch.py")
-_MOST_OUTPUT = 8 * 2**20  # bytes of stdout that are kept
+_MOST_OUTPUT = 8 * 2**20  # most bytes kept of stdout
 _MOST_MESSAGES = 200
 _LONGEST_LINE = 64 * 1024
-_LOOK_SECONDS = 0.1  # between two looks at the clock and at `stopped`
-_STOP_SECONDS = 5.0  # that a program may take to end in order
+_LOOK_SECONDS = 0.1  # between checks of the clock and of `stopped`
+_STOP_SECONDS = 5.0  # for a program to stop cleanly
 
 
 @dataclass(frozen=True)
@@ -27,16 +27,16 @@ class Limits:
     seconds: float
     memory: int  # bytes of address space
     cpu_seconds: int
-    file_bytes: int  # of one file that it writes
+    file_bytes: int  # largest file that it writes
 
 
 @dataclass
 class Outcome:
-    """How it ended. `code` is the exit code, negative for a signal; `why` is 'timeout' or 'stopped' where we ended it."""
+    """How it ended. `code` is the exit code, negative for a signal; `why` is 'timeout' or 'stopped' if we ended it."""
 
     code: int
     why: str | None = None
-    document: Any = None  # what it printed as JSON
+    document: Any = None  # its JSON output
     messages: list[tuple[str, str]] = field(default_factory=list)  # (level, text)
     seconds: float = 0.0
     peak_bytes: int = 0  # resident
@@ -47,12 +47,12 @@ class Outcome:
 
     @property
     def error(self) -> str:
-        """The program's own words for what went wrong; empty where it had none."""
+        """The program's error message; empty if there is none."""
         return next((text for level, text in reversed(self.messages) if level == "error"), "")
 
 
 class _Events:
-    """stderr of --progress json, line by line. What is no event is kept as a message: nothing gets lost."""
+    """Parses stderr of --progress json line by line. Other lines are kept as messages."""
 
     def __init__(self, on_progress: Callable[[dict], None]):
         self.messages: list[tuple[str, str]] = []
@@ -99,7 +99,7 @@ def run(
     on_progress: Callable[[dict], None] = lambda event: None,
     stopped: Callable[[], bool] = lambda: False,
 ) -> Outcome:
-    """Runs `words` in `folder` and waits for its end. Returns when the process is gone, whatever happened.
+    """Runs `words` in `folder`. Returns when the process has ended, however it ended.
 
     Asked to stop it gets SIGTERM, and SIGKILL some seconds later; out of time, SIGKILL. It dies with this process.
     """
@@ -112,13 +112,13 @@ def run(
             stdin=source,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            # Nothing of the service's own environment: there may be a token in it.
+            # Without the service's environment, which may contain a token.
             env={"PATH": "/usr/bin:/bin", "LANG": "C.UTF-8", "HOME": "/nonexistent", "TMPDIR": str(folder)},
             start_new_session=True,
         )
     try:
         return _follow(process, begin, limits, on_progress, stopped)
-    except BaseException:  # the caller is being ended: so is the process
+    except BaseException:  # the caller is stopped, so stop the process
         if process.returncode is None:
             _signal(process, signal.SIGKILL)
             _reap(process, float("inf"))
@@ -151,7 +151,7 @@ def _follow(process: subprocess.Popen, begin: float, limits: Limits, on_progress
                 why = why or "timeout"
                 _signal(process, signal.SIGKILL)
                 kill_at = float("inf")
-        # It may have closed its pipes and live on.
+        # It may have closed its pipes but still run.
         code, usage = _reap(process, kill_at)
     events.end()
     return Outcome(
@@ -165,7 +165,7 @@ def _follow(process: subprocess.Popen, begin: float, limits: Limits, on_progress
 
 
 def _signal(process: subprocess.Popen, number: int) -> None:
-    """To all of its group. It is not reaped yet, so the number is still its own."""
+    """Signals its whole group. It is not reaped yet, so its id is still valid."""
     try:
         os.killpg(process.pid, number)
     except ProcessLookupError:

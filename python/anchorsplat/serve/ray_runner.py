@@ -1,4 +1,4 @@
-"""Jobs as Ray tasks: the input goes to whichever node is free, progress and the result come back as they are made.
+"""Runs jobs as Ray tasks: the input goes to a free node, progress and result are streamed back.
 
 Nodes need the same build of this package. A node that is lost is tried once more elsewhere, by Ray.
 """
@@ -18,14 +18,14 @@ from .._cluster_address import look_for
 from .process import Outcome
 from .runner import STATE, Task, clear, run_in_folder
 
-_MORE_MEMORY = 256 * 2**20  # of a job, beside what its input takes
+_MORE_MEMORY = 256 * 2**20  # of a job, in addition to its input
 _MEMORY_PER_INPUT_BYTE = 16
 
 
 def _job(
     task: Task, stdin: bytes | None, links: dict[str, bytes], state: bytes | None, fingerprint: str
 ) -> Iterator[object]:
-    """On a node: yields progress, then the outcome with the files that it left. Paths of `task` are the service's."""
+    """Runs on a node. Yields progress, then the outcome with its files. Paths of `task` are those of the service."""
     from .engine import find_program, fingerprint_of
 
     program = find_program()
@@ -56,7 +56,7 @@ def _job(
             except BaseException as error:
                 events.put(error)
 
-        # The process dies with the thread that started it, so the thread outlives it.
+        # The process ends with the thread that started it, so the thread must outlive it.
         thread = threading.Thread(target=work)
         thread.start()
         try:
@@ -71,7 +71,7 @@ def _job(
 
 
 def _next(events: queue.SimpleQueue) -> object:
-    """Looks up from waiting: only then Ray's way to cancel a task reaches it."""
+    """Interrupts waiting regularly, so that Ray can cancel the task."""
     while True:
         try:
             return events.get(timeout=0.1)

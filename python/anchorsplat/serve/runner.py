@@ -1,4 +1,4 @@
-"""Where jobs run: in processes of this machine, or of a Ray cluster's (ray_runner.py)."""
+"""Runs jobs in local processes, or on a Ray cluster (ray_runner.py)."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from typing import Protocol
 
 from .process import Limits, Outcome, run
 
-#: Left by a job that was stopped in order, for the next attempt to go on from.
+#: State that a cleanly stopped job leaves for the next attempt to resume.
 STATE = "state"
 
 
 @dataclass(frozen=True)
 class Task:
-    words: list[str]  # for the program, after its name
+    words: list[str]  # arguments of the program
     limits: Limits
-    folder: Path  # to run in; files of a result are left here
+    folder: Path  # working folder, with the files of the result
     stdin: Path | None
-    links: dict[str, Path]  # further inputs, by their names in the folder
+    links: dict[str, Path]  # further inputs, by name in the folder
 
 
 class Runner(Protocol):
     def run(self, task: Task, on_progress: Callable[[dict], None], stopped: Callable[[], bool]) -> Outcome:
-        """Blocks until it is over, in a thread that lives at least as long."""
+        """Blocks until the job ends. The calling thread must live at least as long."""
 
     def close(self) -> None: ...
 
@@ -57,7 +57,7 @@ def run_in_folder(program: Path, task: Task, on_progress, stopped) -> Outcome:
 
 
 def clear(folder: Path) -> None:
-    """Makes the folder, or empties it of all but the state to go on from."""
+    """Creates the folder, or empties it except for the state to resume."""
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     for path in folder.iterdir():
         if path.is_dir():
@@ -67,6 +67,6 @@ def clear(folder: Path) -> None:
 
 
 def leave_result(task: Task) -> None:
-    """Takes away what was there for the job only."""
+    """Removes files that only the job needed."""
     for name in (*task.links, STATE):
         (task.folder / name).unlink(missing_ok=True)

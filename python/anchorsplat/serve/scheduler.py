@@ -1,4 +1,4 @@
-"""Takes works from the store, has them run, tells who watches. One thread per job waits for its process."""
+"""Takes works from the store, runs them and notifies watchers. One thread per job waits for its process."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _MOST_ATTEMPTS = 2
 
 
 class Busy(Exception):
-    """Too much waits already. `seconds`: when it may be worth trying again."""
+    """The queue is full. `seconds`: when to retry."""
 
     def __init__(self, seconds: int):
         super().__init__(f"too many jobs wait already; try again in {seconds} s")
@@ -40,7 +40,7 @@ class Busy(Exception):
 
 
 class Refused(Exception):
-    """The program refused or failed: a code and a sentence."""
+    """The program refused or failed, with code and message."""
 
     def __init__(self, code: str, message: str):
         super().__init__(message)
@@ -48,7 +48,7 @@ class Refused(Exception):
 
 
 class _Changes:
-    """Wakes all who wait, each time. Take next() before looking at what may change: then no change is missed."""
+    """Wakes all waiters on every change. Call next() before reading the state, so that no change is missed."""
 
     def __init__(self) -> None:
         self._event = asyncio.Event()
@@ -62,8 +62,8 @@ class _Changes:
 
 
 class _Source:
-    """An input for the program. From standard input nothing but its own bytes is looked at, whatever files it names; only
-    what its name has to tell, because nothing in it does, has a name, and formats of that kind name no files."""
+    """An input for the program, passed on standard input, so that no files named in it are read. Only formats that cannot be
+    recognised by content are passed by name; they name no files."""
 
     def __init__(self, path: Path, hint: str):
         self.word = f"input{hint}" if hint else "-"
@@ -74,16 +74,16 @@ class _Source:
 class Scheduler:
     def __init__(self, store: Store, engine: Engine, runner: Runner, settings: Settings, metrics: Metrics):
         self.store, self.engine, self.settings, self.metrics = store, engine, settings, metrics
-        self.progress: dict[str, dict] = {}  # by key, of works that run
+        self.progress: dict[str, dict] = {}  # of running works, by key
         self.uploading = 0
         self._runner = runner
-        self._small = LocalRunner(engine.program)  # checks, conversions of results, pages
+        self._small = LocalRunner(engine.program)  # for checks, conversions of results, pages
         self._small_waiting = 0
         self._deriving: dict[tuple[str, str], asyncio.Task] = {}
-        self._ends: dict[str, threading.Event] = {}  # by key: end this one
+        self._ends: dict[str, threading.Event] = {}  # by key, to stop a work
         self._closing = threading.Event()
         self._changes: weakref.WeakValueDictionary[str, _Changes] = weakref.WeakValueDictionary()
-        self._seconds = 5.0  # that a job takes, lately
+        self._seconds = 5.0  # recent duration of a job
         self._jobs = ThreadPoolExecutor(settings.workers, thread_name_prefix="job")
         self._checks = ThreadPoolExecutor(max(2, min(8, os.cpu_count() or 1)), thread_name_prefix="check")
         self._tasks: list[asyncio.Task] = []
@@ -99,16 +99,16 @@ class Scheduler:
         return self._closing.is_set()
 
     def begin_to_stop(self) -> None:
-        """Who watches is told, so that connections end."""
+        """Notifies watchers, so that connections end."""
         self._closing.set()
         self._tell_queue()
 
     async def stop(self) -> None:
-        """Jobs that run end in order and are queued again; derived files are given up."""
+        """Stops running jobs cleanly and queues them again; drops unfinished derived files."""
         self.begin_to_stop()
         for task in self._tasks:
             if task is not self._tasks[-1]:
-                self._work_there.release()  # whoever waits for work sees that it is over
+                self._work_there.release()  # wakes threads that wait for work
         self._tasks[-1].cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         await asyncio.gather(*self._deriving.values(), return_exceptions=True)
@@ -116,16 +116,16 @@ class Scheduler:
         self._checks.shutdown()
         self._runner.close()
 
-    # For those who ask
+    # Requests
 
     def admit(self) -> None:
-        """Raises Busy where one more upload would be too many."""
+        """Raises Busy if there are too many uploads."""
         waiting = self.store.count(states.QUEUED) + self.uploading
         if waiting >= self.settings.queue:
             raise Busy(max(1, min(600, round(self._seconds * waiting / self.settings.workers))))
 
     async def check(self, upload: Path, hint: str, name: str) -> dict:
-        """What an upload is: {"format", "gaussians", "bytes", "sh_degree"}. Raises Refused where it is no splat."""
+        """Facts of an upload: {"format", "gaussians", "bytes", "sh_degree"}. Raises Refused if it is not a splat."""
         folder = upload.with_name(upload.name + ".check")
         source = _Source(upload, hint)
         task = Task(self.engine.check(source.word, hint), self.engine.limits(), folder, source.stdin, source.links)
@@ -161,11 +161,11 @@ class Scheduler:
         self._tell(key)
 
     def changes(self, key: str) -> _Changes:
-        """Hold on to it: only held ones are told."""
+        """Keep a reference: only referenced ones are notified."""
         return self._changes.setdefault(key, _Changes())
 
     async def derived(self, key: str, name: str, task: Callable[[Path], Task]) -> Path:
-        """A file made of a result when it is first asked for: another format, the page. Raises Busy, Refused."""
+        """A file derived from a result on first request: another format, the page. Raises Busy, Refused."""
         path = self.store.result_folder(key) / name
         self.store.touch(key)
         if path.exists():
@@ -176,16 +176,16 @@ class Scheduler:
             deriving = asyncio.create_task(self._derive(key, name, task(self.store.work_folder(f"{key}.{name}"))))
             self._deriving[key, name] = deriving
             deriving.add_done_callback(lambda task: self._derived(key, name, task))
-        # Whoever goes away does not take it from the others.
+        # A client that leaves does not cancel it for others.
         return await asyncio.shield(self._deriving[key, name])
 
     def _derived(self, key: str, name: str, task: asyncio.Task) -> None:
         self._deriving.pop((key, name), None)
         if not task.cancelled():
-            task.exception()  # all who asked may have gone away
+            task.exception()  # all clients may have left
 
     async def other_format(self, key: str, to: str) -> Path:
-        """Of the PLY that a result is."""
+        """Converts the PLY of a result."""
         source = self.store.result_folder(key) / "result.ply"
         name = "result.gltf.zip" if to == "gltf" else f"result.{to}"
         return await self.derived(
@@ -193,7 +193,7 @@ class Scheduler:
         )
 
     async def page(self, work: sqlite3.Row, result: str, title: str) -> Path:
-        """Before and after."""
+        """Makes the before/after page."""
         before = _Source(self.store.input_path(work["input"]), Path(work["input"]).suffix)
         after = f"after{result.removeprefix('result')}"
         links = before.links | {after: self.store.result_folder(work["key"]) / result}
@@ -202,7 +202,7 @@ class Scheduler:
             work["key"], "view.html", lambda folder: Task(words, self.engine.limits(), folder, before.stdin, links)
         )
 
-    # The work itself
+    # Work
 
     async def _derive(self, key: str, name: str, task: Task) -> Path:
         try:
@@ -284,7 +284,7 @@ class Scheduler:
             self._seconds += 0.2 * (outcome.seconds - self._seconds)
             if self.store.stored_bytes() > self.settings.keep_bytes:
                 self.sweep()
-        elif cancelled and self.store.is_wanted(key):  # by somebody who came while it was being ended
+        elif cancelled and self.store.is_wanted(key):  # requested again while it was being stopped
             self.store.requeue(key)
             self._work_there.release()
             return
@@ -310,14 +310,14 @@ class Scheduler:
         self.metrics.job_ended(kind, state, outcome)
 
     def _give_up(self, key: str) -> None:
-        """After an error of ours. Where not even that can be written down, the next start tries the work again."""
+        """Records an internal error. If that fails too, the next start retries the work."""
         try:
             self.store.fail(key, states.FAILED, "failed", "The service could not finish this job; its log says why.")
         except sqlite3.Error:
             log.exception("and it could not be noted")
         self._tell(key)
 
-    # What goes
+    # Cleaning up
 
     def sweep(self) -> None:
         deriving = {key for key, _ in self._deriving}
@@ -326,7 +326,7 @@ class Scheduler:
             log.info("%d old results were deleted", gone)
 
     def make_room(self) -> None:
-        """The disk is full before --keep-bytes is reached: a quarter of what is kept goes."""
+        """Deletes a quarter of what is kept: the disk is full before --keep-bytes is reached."""
         try:
             self.store.sweep(self.settings.keep_days, self.store.stored_bytes() * 3 // 4)
         except (sqlite3.Error, OSError):
@@ -355,7 +355,7 @@ class Scheduler:
 
 
 def _complete(task: Task) -> None:
-    """Several files become one, so that a result is always a file."""
+    """Packs several files into one, so that a result is always one file."""
     leave_result(task)
     views = task.folder / "views"
     if views.is_dir():

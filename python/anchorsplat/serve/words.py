@@ -1,4 +1,4 @@
-"""What was found, assumed and done, in sentences for people. The numbers are in the report's `details`."""
+"""Describes in sentences what was found, assumed and done. The numbers are in the report's `details`."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LOOKS = {
 
 
 def report_of(kind: str, document: object, messages: list[tuple[str, str]], seconds: float) -> dict:
-    """The report of a job that is done, of what the program printed."""
+    """The report of a finished job, from the program's output."""
     row = document[0] if isinstance(document, list) and document else document
     row = row if isinstance(row, dict) else {}
     sentences = {"enhance": _enhanced, "convert": _converted, "render": _rendered}[kind](row)
@@ -87,7 +87,7 @@ def _looks(row: dict) -> list[str]:
     return [f"It looks like {_LOOKS.get(looks, looks)} ({share} %)."]
 
 
-_MOST_NAMED = 4  # as one reads
+_MOST_NAMED = 4  # in a sentence
 
 
 def _pixel_size(row: dict) -> list[str]:
@@ -103,7 +103,7 @@ def _pixel_size(row: dict) -> list[str]:
         more = f" and {len(parts) - _MOST_NAMED} more" if len(parts) > _MOST_NAMED else ""
         return [f"The splat has {len(parts)} separate parts, with pixels of {of_each}{more}."]
     if source == "read" and reading:
-        taken = f"; {value:.4g} was taken" if row.get("filter_strength") else ""  # else a warning says why
+        taken = f"; {value:.4g} was taken" if row.get("filter_strength") else ""  # otherwise a warning gives the reason
         return [
             f"A training pixel measured about {reading['pixel']:.4g} world units, as the splat looks "
             f"({reading['low']:.4g} to {reading['high']:.4g}){taken}. Cameras make it exact."

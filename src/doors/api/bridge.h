@@ -48,14 +48,14 @@ Result<RunContext> ToContext(const RunSettings& run);
 // Opens the device of RunSettings::device. kNotFound: unavailable.
 Status OpenDevice();
 
-// Runs `call` in a run of its own and converts its result for the library's caller; catches all exceptions.
+// Runs `call` as a separate run and converts its result to public types; catches all exceptions.
 template <typename T, typename Call>
 Expected<T> InRun(const RunSettings& run, Call&& call) try {
   auto context = ToContext(run);
   if (!context.ok()) return ToFailure(context.error());
   const RunScope scope(*std::move(context));
   if (const Status device = OpenDevice(); !device.ok()) return ToFailure(device.error());
-  const InputRecord record;  // nothing that the call reads is overwritten by it
+  const InputRecord record;  // the call never overwrites what it reads
   auto result = call();
   if (!result.ok()) return ToFailure(result.error());
   if constexpr (std::is_void_v<T>) {

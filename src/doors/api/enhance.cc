@@ -57,7 +57,7 @@ Result<EnhanceOptions> ToOptions(const EnhanceSettings& settings) {
     ANCHORSPLAT_RETURN_IF_ERROR(SetRefineOption(options.refine, name, value));
     given(true, name == "most-gaussians" ? "max-gaussians" : name.c_str());
   }
-  SetBudget(options, options.refine.max_gaussians);  // a single budget, wherever it was set
+  SetBudget(options, options.refine.max_gaussians);  // one budget, wherever it was set
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(options.refine));
   return options;
 }

@@ -10,14 +10,14 @@
 
 namespace anchorsplat {
 
-// One of several inputs of a verb that makes a file of each.
+// One of several inputs, with its output.
 struct BatchItem {
   std::string input, output;
 };
 
-// Runs `run` for each item and prints the rows of results it returns, as --json asks for. What is wrong with one of
-// several is said and does not keep the others from being done: its row has a `failure`, and the program ends with
-// kPartialExitCode. Errors: that of the only item; of the last one where none could be done; kInterrupted at once.
+// Runs `run` for each item and prints the rows it returns with --json. If one of several items fails, the others are
+// still done: its row has a `failure`, and the program ends with kPartialExitCode. Errors: that of a single item; the
+// last one if all failed; kInterrupted at once.
 Status RunBatch(const std::vector<BatchItem>& items, const std::function<Result<nlohmann::json>(size_t)>& run,
                 Program& program);
 

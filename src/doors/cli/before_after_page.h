@@ -13,14 +13,13 @@ namespace anchorsplat {
 // The page that `enhance --view` writes beside its output: scan-4x.ply and scan-4x.html.
 std::filesystem::path PagePath(const std::filesystem::path& output);
 
-// Errors: kBadArgument where two outputs would have one page.
+// Errors: kBadArgument if two outputs would have the same page.
 Status CheckPages(std::span<const std::filesystem::path> outputs);
 
-// That a page of `before` and of what will come of it is not far beyond what a browser opens (kBadArgument): estimated,
-// before the work begins.
+// Estimates before the work whether a page of `before` and its result would be too large for a browser (kBadArgument).
 Status CheckPageFits(const std::filesystem::path& output, const GaussianCloud& before, const EnhanceOptions& options);
 
-// Errors say that `output` is written all the same.
+// Errors say that `output` itself was written.
 Status WritePage(const std::filesystem::path& input, const GaussianCloud& before, const std::filesystem::path& output,
                  const Enhanced& enhanced, const WriteOptions& options);
 

@@ -7,13 +7,12 @@
 
 namespace anchorsplat {
 
-// A name as it is shown within a line: bytes that are no UTF-8 or could command a terminal, line ends among them, are
-// escaped.
+// A name for display within a line: escapes line ends, terminal controls and bytes that are not UTF-8.
 std::string OneLine(const std::filesystem::path& name);
 
-// While it lives, what is written to `stream` arrives line by line as Printable() shows it: results name files, folders
-// and views, and quote what is in them, and none of that may command a terminal. Messages on stderr go through the same
-// (core/log.cc). Only line ends pass; those in names are OneLine()'s business.
+// During its lifetime, text written to `stream` passes through Printable() line by line, so that names and quoted file
+// contents cannot control the terminal. Messages on stderr do the same (core/log.cc). Line ends pass; use OneLine() for
+// names.
 class CleanOutput : private std::streambuf {
  public:
   explicit CleanOutput(std::ostream& stream);
@@ -32,8 +31,8 @@ class CleanOutput : private std::streambuf {
   std::string held_;  // of the line that is not whole yet
 };
 
-// JSON text in which nothing can command a terminal, nor is changed by CleanOutput: control characters above U+007E are
-// written as \u00xx. They occur within strings only.
+// JSON text that cannot control a terminal and that CleanOutput leaves unchanged: control characters above U+007E,
+// which occur only in strings, become \u00xx.
 std::string CleanJson(const std::string& json);
 
 }  // namespace anchorsplat

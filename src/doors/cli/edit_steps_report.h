@@ -7,7 +7,7 @@
 
 namespace anchorsplat {
 
-// A line for each edit that takes Gaussians away: how many, and how many are left.
+// A line per edit that removes Gaussians, with the numbers removed and left.
 void PrintSteps(const std::vector<EditStep>& steps, std::ostream& out);
 
 }  // namespace anchorsplat

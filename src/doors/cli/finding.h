@@ -8,7 +8,7 @@ inline constexpr const char* kReady = "ready";
 inline constexpr const char* kMissing = "missing";  // an extra that was not asked for when this was built or set up
 inline constexpr const char* kBroken = "broken";    // is there and does not work
 
-// One line of what `doctor` says.
+// One line of `doctor`.
 struct Finding {
   std::string name;
   const char* state = kReady;

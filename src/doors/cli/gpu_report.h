@@ -9,7 +9,7 @@
 
 namespace anchorsplat {
 
-// What `doctor` finds of GPUs.
+// GPU findings of `doctor`.
 struct GpuFindings {
   GpuLibrary library;
   std::vector<GpuAdapter> adapters;
@@ -19,15 +19,15 @@ struct GpuFindings {
 };
 GpuFindings LookForGpus();
 
-// What a verb says that works on it.
+// Message of a verb that uses the adapter.
 std::string WorkingOn(const GpuAdapter& adapter);
 
-// Why --device auto does not take an adapter, as a sentence's end; empty: it does.
+// Why --device auto does not choose an adapter; empty: it may.
 std::string WhyNotTaken(const GpuAdapter& adapter);
 
-// Of each adapter what it is and why it is not taken; a line that says what is missing where there are none.
+// Each adapter, with the reason if it is not usable; or what is missing if there is none.
 std::vector<std::string> LinesOf(const GpuFindings& findings);
-// How to get what is missing; empty: nothing is.
+// Command that gets what is missing; empty: nothing is missing.
 std::string CommandFor(const GpuFindings& findings);
 nlohmann::json ToJson(const GpuFindings& findings);
 

@@ -6,11 +6,11 @@
 
 namespace anchorsplat {
 
-// Gives `app` and the verbs that are added to it later `--help` and `--help-all`.
+// Adds `--help` and `--help-all` to `app` and to verbs added later.
 void AddHelp(CLI::App& app);
 
-// `--help` of this verb shows only these options ("--output"), in this order, behind the positional ones; `--help-all`
-// shows every option, in groups. Without a call both show every option.
+// Makes `--help` of this verb show only these options ("--output"), in this order, after the positional ones.
+// `--help-all` shows all in groups; without this call so does `--help`.
 void ShortenHelp(CLI::App& verb, std::vector<std::string> options);
 
 }  // namespace anchorsplat

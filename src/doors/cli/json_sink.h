@@ -6,7 +6,7 @@
 
 namespace anchorsplat {
 
-// Of --progress json, for programs that start this one: every event is a line of JSON on stderr, one of
+// For --progress json, used by calling programs: every event is a line of JSON on stderr, one of
 //
 //   {"level": "info" | "warning" | "error", "message": TEXT}
 //   {"task": NAME, "done": N, "total": N, "note": TEXT}   (total 0: unknown; no note where there is none; at most ten a

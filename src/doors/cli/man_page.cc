@@ -8,7 +8,7 @@ namespace anchorsplat {
 
 namespace {
 
-// Text as roff takes it: a hyphen that is meant is \-, a line must not begin like a request.
+// Escapes text for roff: hyphens as \-, and no line begins like a request.
 std::string Roff(const std::string& text) {
   std::string out;
   for (const char c : text) {
@@ -58,7 +58,7 @@ void AddGroups(const std::vector<DeclaredOption>& options, std::string& out) {
     if (seen.insert(option.group).second) groups.push_back(option.group);
   }
   for (const std::string& group : groups) {
-    // The library's name for what belongs to no group says nothing.
+    // CLI11's name for options without a group.
     if (group != "Options") out += ".SS \"" + Roff(group) + "\"\n";
     for (const DeclaredOption& option : options) {
       if (option.group == group) AddOption(option, out);

@@ -9,7 +9,7 @@
 
 namespace anchorsplat {
 
-// While it lives, messages begin with the name of what they are about: of many files nobody could tell whose they are.
+// During its lifetime, messages begin with the name of the file that they are about.
 class NamedMessages {
  public:
   explicit NamedMessages(std::string name) : sink_(std::make_shared<Sink>(std::move(name))) {

@@ -13,27 +13,26 @@
 
 namespace anchorsplat {
 
-// What verbs that write splats are told about large ones.
+// Options about large splats.
 struct SizeFlags {
   uint64_t max_memory = 0;  // bytes; 0: DefaultMaxMemory()
   bool yes = false;
 
   void AddTo(CLI::App& verb);
   uint64_t memory() const;  // bytes of all
-  // Of them, what large arrays may take (core/memory_limit.h).
+  // Memory for large arrays (core/memory_limit.h).
   uint64_t arrays() const { return memory() / 4 * 3; }
 };
 
-// A quarter of the machine's memory: what lies in temporary files is kept in the rest by the system as
-// long as nobody else needs it.
+// A quarter of the machine's memory. The system caches temporary files in the rest.
 uint64_t DefaultMaxMemory();
 
-// A Gaussian's row of all arrays of a cloud, in bytes.
+// Bytes of one Gaussian in all arrays of a cloud.
 constexpr uint64_t RowBytes(int sh_degree) {
   return sizeof(float) * (11 + 3 * static_cast<uint64_t>(ShCoefficients(sh_degree)));
 }
 
-// What is known of an output before the work begins.
+// What is known about an output before the work.
 struct OutputPlan {
   std::string input;
   std::filesystem::path output;
@@ -45,16 +44,16 @@ struct OutputPlan {
   std::optional<double> seconds = std::nullopt;
 };
 
-// From here on a file is asked for.
+// Larger outputs need confirmation.
 inline constexpr uint64_t kLargeOutput = 4'000'000'000;
 
-// Says what will come out of one command and what it takes, unless that is little; asks where all of it together is
-// more than kLargeOutput or than the disk has room for. kBadArgument: nobody can be asked (no terminal) or the answer
-// was no, and there is no --yes.
+// Reports the expected outputs of a command and their cost, unless small. Asks for confirmation if together they exceed
+// kLargeOutput or the free disk space. kBadArgument: no --yes, and no terminal to ask on or the answer was no.
 Status SayAndAsk(std::span<const OutputPlan> plans, const SizeFlags& flags, const SharedFlags& shared);
 
-// Bytes that can be stored where this file will be, in a folder that may not be there yet. Nothing where the system
-// does not say, nor where nothing can be stored at all (/proc), which writing says better.
+// Free bytes on the disk of this file, whose folder may not exist yet. Unset if unknown, or if nothing can be stored
+// there
+// (/proc), for which writing gives the better error.
 std::optional<uint64_t> RoomFor(const std::filesystem::path& output);
 
 }  // namespace anchorsplat

@@ -14,21 +14,21 @@ namespace anchorsplat {
 
 inline constexpr const char* kPipedFormatHelp = "With -o -: format, by its extension";
 
-// Whether an output is called so that it goes to standard output: "-" or /dev/stdout.
+// Whether the name of an output means standard output: "-" or /dev/stdout.
 bool IsStandardOutput(const std::filesystem::path& output);
 
-// A file that goes to standard output, whole or not at all: writers put it into memory under a name, and Send() passes
-// it on. Results for people go to stderr meanwhile.
+// A file that goes to standard output, whole or not at all: writers write it to memory under a name, and Send() sends
+// it. Results for people go to stderr.
 class StandardOutput {
  public:
-  // For a file that has this extension. Errors (kBadArgument): standard output is a terminal, or --json writes there.
+  // For a file with this extension. Errors (kBadArgument): standard output is a terminal, or --json uses it.
   static Result<StandardOutput> Open(const std::string& extension, const SharedFlags& shared);
-  // For a splat: ".spz" or "spz". Errors, too: no format that is written, or one of several files.
+  // For a splat: ".spz" or "spz". Also kBadArgument: a format that cannot be written, or has several files.
   static Result<StandardOutput> ForSplat(const std::string& format, const SharedFlags& shared);
 
   const std::filesystem::path& path() const { return path_; }  // of the file, for writers and messages
   OutputMemory* memory() const { return memory_.get(); }       // where it is to be put
-  // kIo: standard output could not be written, as when nobody reads it any more.
+  // kIo: writing failed, as when the reader has gone.
   Status Send() const;
 
  private:
@@ -39,9 +39,9 @@ class StandardOutput {
   std::unique_ptr<OutputMemory> memory_;
 };
 
-// An output as people know it: nobody has seen the name that writers get for standard output.
+// Name of an output for messages, instead of the internal name of standard output.
 std::string OutputName(const std::filesystem::path& output, const OutputMemory* piped);
-// kBadArgument where a folder for outputs is called as standard output is, which cannot take several.
+// kBadArgument if the name of an output folder means standard output.
 Status CheckOutDir(const std::string& folder);
 
 // Where results for people go.

@@ -35,7 +35,7 @@ StopSignal::StopSignal(Leaves leaves)
 StopSignal::~StopSignal() {
   std::signal(SIGINT, SIG_DFL);
   std::signal(SIGTERM, SIG_DFL);
-  // What was asked to end still writes what it has, and the terminal is gone.
+  // After a stop request results are still written, even if the terminal is gone.
   if (stop_requested) return;
   SetUnlessIgnored(SIGHUP, SIG_DFL);
   std::signal(SIGPIPE, SIG_DFL);

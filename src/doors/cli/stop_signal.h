@@ -4,12 +4,11 @@
 
 namespace anchorsplat {
 
-// While the object lives, Ctrl-C, SIGTERM and SIGHUP, which a closed terminal or a lost connection sends, ask for an
-// end: StopRequested() (core/run_context.h) becomes true, and where nothing of the work is wanted then, as there is no
-// going on from it, the run is abandoned: RunAbandoned comes out of it, which RunProgram tells as interrupted. The
-// second Ctrl-C or SIGTERM ends the program at once; SIGHUP may come twice by itself, from the shell and from the
-// system, and changes nothing more. It is not listened to under nohup. A pipe whose reader has gone (SIGPIPE: `2>&1 |
-// tee` dies with the terminal, too) ends nothing: what was to be said is lost, not the work. One at a time.
+// During its lifetime, Ctrl-C, SIGTERM and SIGHUP (closed terminal, lost connection) request a stop: StopRequested()
+// (core/run_context.h) becomes true. A run that cannot be resumed is abandoned: it throws RunAbandoned, which
+// RunProgram reports as interrupted. A second Ctrl-C or SIGTERM ends the program at once. A second SIGHUP, which shell
+// and system may both send, has no effect; under nohup SIGHUP is ignored. SIGPIPE is ignored, so that the work survives
+// a lost reader such as `tee`. Only one object at a time.
 class StopSignal {
  public:
   enum class Leaves { kWhatIsDone, kNothing };

@@ -11,8 +11,7 @@ namespace anchorsplat {
 size_t DisplayWidth(std::string_view text);
 
 // Rows of text as aligned columns, two spaces apart: the first column left-aligned, the others right-aligned. The first
-// row is the heading and gets a rule below it. Cells may hold any bytes: what could command a terminal or end the line
-// is escaped.
+// row is the heading, with a rule below it. Line ends and terminal controls in cells are escaped.
 std::string FormatTable(std::vector<std::vector<std::string>> rows);
 
 }  // namespace anchorsplat

@@ -14,35 +14,35 @@
 
 namespace anchorsplat {
 
-// The flags that every verb has. Declared once, in AddVerb.
+// The flags of every verb, declared once, in AddVerb.
 struct SharedFlags {
   bool overwrite = false;
   bool quiet = false;
-  bool json = false;           // stdout carries one JSON document and nothing else
-  bool json_progress = false;  // and stderr one for each event (json_sink.h)
+  bool json = false;           // stdout has one JSON document and nothing else
+  bool json_progress = false;  // stderr has one JSON line per event (json_sink.h)
   int threads = 0;             // 0: the whole machine
   uint64_t seed = 0;
 };
 
 struct TrainReport;
 struct TrainRequest;
-// The training, in the program that has it (train/trainer.h).
+// The training loop; null in a program without it (train/trainer.h).
 struct Trainer {
   Result<TrainReport> (*run)(const TrainRequest&) = nullptr;
 };
 
-// What the command line asked for; main runs it once parsing is over.
+// The parsed command line; main runs it after parsing.
 struct Program {
   SharedFlags flags;
-  DeviceFlags device;  // of verbs that rasterize, which declare them; the CPU for all others
+  DeviceFlags device;  // set by verbs that rasterize; the CPU for all others
   std::function<Status()> run;
-  // Of a run that succeeds: set to kPartialExitCode by verbs that go on when one of many inputs fails.
+  // Of a successful run: kPartialExitCode if one of several inputs failed.
   int exit_code = 0;
   std::vector<std::string> words;  // argv
   Trainer trainer;
 };
 
-// A subcommand with the shared flags, its description and an example for --help.
+// Adds a subcommand with the shared flags, its description and an example for --help.
 CLI::App& AddVerb(CLI::App& app, Program& program, const std::string& name, const std::string& description,
                   const std::string& example);
 
@@ -64,7 +64,7 @@ void AddDoctor(CLI::App& app, Program& program);
 void AddPython(CLI::App& app, Program& program);
 void AddManual(CLI::App& app, Program& program);
 
-// All of them, in the order in which --help lists them.
+// Adds all verbs, in the order of --help.
 void AddVerbs(CLI::App& app, Program& program);
 
 inline WriteOptions WriteOptionsFrom(const SharedFlags& flags) { return {.overwrite = flags.overwrite}; }

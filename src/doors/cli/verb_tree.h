@@ -6,16 +6,15 @@
 
 namespace anchorsplat {
 
-// The command line as it was declared, for all that is written about it: man page and completions come from here, so
-// that they cannot tell anything else than --help.
+// The declared command line. --help, the man page and completions are all made from it, so they agree.
 
 struct DeclaredOption {
   std::vector<std::string> names;    // "-o", "--output"; empty for a positional one
   std::string positional;            // "inputs", for a positional one
-  std::string group;                 // as --help heads it
-  std::string value;                 // "TEXT", "INT"; empty for a flag
-  std::vector<std::string> choices;  // the words that it takes, where these are all
-  std::string range;                 // "[0 - 1024]", where it is bounded
+  std::string group;                 // heading in --help
+  std::string value;                 // "FILE", "INT"; empty for a flag
+  std::vector<std::string> choices;  // all words that it takes, if limited
+  std::string range;                 // "[0 - 1024]", if bounded
   std::string default_value;
   std::string description;
   bool required = false;
@@ -26,7 +25,7 @@ struct DeclaredVerb {
   std::vector<std::string> words;  // {"dataset", "build"}
   std::string description;
   std::string footer;                   // the example
-  std::vector<DeclaredOption> options;  // none where there are verbs below
+  std::vector<DeclaredOption> options;  // none if there are subcommands
   std::vector<DeclaredVerb> verbs;
 
   std::string name(const char* between = " ") const;  // "dataset build"
@@ -34,9 +33,9 @@ struct DeclaredVerb {
 
 inline constexpr const char* kSharedFlagsGroup = "Shared flags";
 
-// Hidden verbs and options are left out, --help and --help-all too.
+// Without hidden verbs, hidden options, --help and --help-all.
 std::vector<DeclaredVerb> DeclaredVerbs(const CLI::App& app);
-// `verb` itself; the program has no words.
+// `verb` itself; the whole program has no `words`.
 DeclaredVerb DeclaredBy(const CLI::App& verb);
 
 // roff of the manual page anchorsplat(1).

@@ -8,12 +8,12 @@
 
 namespace anchorsplat {
 
-// For paths: an empty one is a variable that was not set, not a wish for the default.
+// For paths: an empty one is an unset shell variable, not a request for the default.
 inline CLI::Validator NotEmpty() {
   return CLI::Validator([](const std::string& text) { return text.empty() ? "must not be empty" : ""; }, "");
 }
 
-// For counts of things to do or to keep.
+// For counts.
 inline CLI::Validator AtLeastOne() {
   return CLI::Validator(
       [](const std::string& text) {
@@ -24,7 +24,7 @@ inline CLI::Validator AtLeastOne() {
       "");
 }
 
-// Bounds without an end. The library's own print the end, which has 309 digits, and let "nan" through.
+// Open bounds. CLI11's own checks print the largest double (309 digits) and accept "nan".
 inline CLI::Validator Positive() {
   return CLI::Validator(
       [](const std::string& text) {
@@ -44,7 +44,7 @@ inline CLI::Validator NotNegative() {
       "NONNEGATIVE");
 }
 
-// For shares of a whole. The library's own range lets "nan" through.
+// For fractions. CLI11's own range check accepts "nan".
 inline CLI::Validator Fraction() {
   return CLI::Validator(
       [](const std::string& text) {
@@ -58,13 +58,11 @@ inline CLI::Validator Fraction() {
 // For an amount of memory: turns "2G" into bytes (ParseMemory in request/parse.h).
 CLI::Validator MemorySize();
 
-// Gives every option of `verb` and of its subcommands that takes a number the check that the number is one: finite and
-// of a size that single precision holds where it is real, within 64 bits where it is whole. The library alone takes
-// "inf" and "nan", and the nearest number of 64 bits for what is beyond them. Done once for all verbs (verb.cc).
+// Checks all numbers of `verb` and its subcommands: floats must be finite in single precision, integers must fit 64
+// bits. CLI11 alone accepts "inf" and "nan" and clamps integers. Called once for all verbs (verb.cc).
 void CheckNumbers(CLI::App& verb);
 
-// An option that takes one of several words for the values of an enumeration. Help shows the words and the default;
-// numbers are not accepted.
+// Adds an option whose words stand for the values of an enumeration. Help shows words and default; numbers are refused.
 template <typename Enum>
 CLI::Option* AddChoice(CLI::App& verb, const std::string& name, Enum& value,
                        const std::vector<std::pair<std::string, Enum>>& choices, const std::string& help) {

@@ -18,7 +18,7 @@ namespace anchorsplat {
 
 namespace {
 
-// Of pictures alone: what says how splats are rendered has no effect.
+// Rendering options have no effect if only pictures are compared.
 Status CheckNothingIsRendered(const CompareFlags& flags) {
   for (const std::string& option : flags.given) {
     for (const char* name : {"orbit", "radius", "target", "fov", "size", "near", "far", "mode", "up", "profile"}) {
@@ -30,7 +30,7 @@ Status CheckNothingIsRendered(const CompareFlags& flags) {
   return {};
 }
 
-// cc_psnr and the like: as gsplat and nerfstudio call them.
+// cc_psnr and similar names are those of gsplat and nerfstudio.
 nlohmann::json ToJson(const ViewScore& score) {
   nlohmann::json json = {{"psnr", FiniteOrNull(score.psnr)}, {"ssim", score.ssim}};
   if (score.lpips) json["lpips"] = *score.lpips;
@@ -44,7 +44,7 @@ nlohmann::json ToJson(const ViewScore& score) {
 
 bool IsPictures(const SideInput& side) { return side.pictures || (!side.cloud && LooksLikeImages(side.path)); }
 
-// Of files that are not all our own renderings.
+// Whether some pictures are not our own renderings.
 bool NeedsPhotographs(const SideInput* side) {
   if (side->empty() || side->pictures || !IsPictures(*side)) return false;
   if (!IsFolder(side->path)) return !IsOwnRendering(side->path);
@@ -80,7 +80,7 @@ Result<Sides> OpenSides(const CompareFlags& flags, SideInput a, SideInput b, Sid
   }
   if (first == nullptr) ANCHORSPLAT_RETURN_IF_ERROR(CheckNothingIsRendered(flags));
   const bool has_cameras = given != nullptr || !flags.views.cameras.empty();
-  // Which of the pictures are the cameras' own says what becomes of them; what we rendered is what it is.
+  // Photographs of the cameras are undistorted and masked; our own renderings are used as they are.
   std::optional<CameraSet> read;
   if (given == nullptr && has_cameras && std::ranges::any_of(inputs, NeedsPhotographs)) {
     std::filesystem::path missing;
@@ -94,7 +94,7 @@ Result<Sides> OpenSides(const CompareFlags& flags, SideInput a, SideInput b, Sid
     }
     ANCHORSPLAT_ASSIGN_OR_RETURN(cameras, MakeViews(flags.views, *first, given));
   } else if (has_cameras) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(cameras, MakeViews(flags.views, CloudView(), given));  // for its background
+    ANCHORSPLAT_ASSIGN_OR_RETURN(cameras, MakeViews(flags.views, CloudView(), given));  // for the background
   }
   Sides sides;
   const std::array<std::unique_ptr<ViewSource>*, 3> out = {&sides.a, &sides.b, &sides.truth};

@@ -15,17 +15,16 @@
 
 namespace anchorsplat {
 
-// The options of `compare` that say how.
+// How to compare.
 struct CompareFlags {
   bool color_correct = false;
   ViewFlags views;
-  std::vector<std::string> given;  // by their names on the command line
+  std::vector<std::string> given;  // option names
 
   void AddTo(CLI::App& verb);
 };
 
-// What is compared: a splat's file, a folder of pictures or a picture; or, in memory, a splat or pictures. Nothing of
-// them: none.
+// One side of a comparison: path of a splat, picture or folder of pictures; or a splat or pictures in memory; or none.
 struct SideInput {
   std::string path;
   std::unique_ptr<GaussianCloud> cloud;
@@ -34,23 +33,23 @@ struct SideInput {
   bool empty() const { return path.empty() && !cloud && !pictures; }
 };
 
-// The two things compared and, where there is one, the truth that both are compared with.
+// Both sides and the ground truth, if any.
 struct Sides {
   std::unique_ptr<ViewSource> a;
   std::unique_ptr<ViewSource> b;
   std::unique_ptr<ViewSource> truth;
 };
 
-// `cameras`: those of --cameras where the caller has them. Errors: of reading; kBadArgument with the option: a splat
-// without views to look from, options without effect.
+// `cameras`: those of --cameras, if already read. Errors: reading; kBadArgument: a splat without views, an option
+// without effect.
 Result<Sides> OpenSides(const CompareFlags& flags, SideInput a, SideInput b, SideInput truth,
                         const CameraSet* cameras = nullptr);
 
 ViewScore MeanOf(const Comparison& comparison);
 
-// What was measured, as --json and Python say it: cc_psnr and the like as gsplat and nerfstudio call them.
+// For --json and Python. cc_psnr and similar names are those of gsplat and nerfstudio.
 nlohmann::json ToJson(const Comparison& comparison);
-// Of one, or of two with the same truth, as "a" and "b".
+// One comparison, or two against the same truth as "a" and "b".
 nlohmann::json ToJson(const std::vector<Comparison>& comparisons);
 
 }  // namespace anchorsplat

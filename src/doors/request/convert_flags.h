@@ -16,18 +16,18 @@
 
 namespace anchorsplat {
 
-// The options of `convert` that say how, not where from and where to.
+// Options of `convert`, without input and output.
 struct ConvertFlags {
-  std::string from;  // name of a format; empty: found out
+  std::string from;  // name of a format; empty: recognised
   std::optional<std::string> axes;
   std::string scales = "logarithms", opacities = "logits", colors = "harmonics";
   int views = 8;
   bool report = false;
   ConvertOptions options;
   EditFlags edits;
-  CLI::Option* spz_version = nullptr;  // of the verb
+  CLI::Option* spz_version = nullptr;  // the verb's option
   CLI::Option* double_means = nullptr;
-  std::vector<CLI::Option*> of_streamed;  // likewise: those that only a streamed SOG knows
+  std::vector<CLI::Option*> of_streamed;  // options for streamed SOG only
 
   void AddTo(CLI::App& verb);
 };
@@ -35,16 +35,16 @@ struct ConvertFlags {
 // Errors: kBadArgument with the option.
 Result<ConvertOptions> MakeConvertOptions(const ConvertFlags& flags, bool overwrite);
 
-// kBadArgument: an option was given that changes none of these files.
+// kBadArgument: a given option affects none of these files.
 Status CheckConvertEffects(const ConvertFlags& flags, std::span<const std::filesystem::path> outputs);
 
-// What becomes one file: `inputs` merged, with the edits that stand behind each, before the first one for all of them,
-// and behind `output_at` paths for the result. `output_at` is the number of the output among the paths, from 1; 0: no
-// path is one, and all edits are done on each input. Errors: kBadArgument with the edit.
+// The job of one output file: `inputs` are merged. An edit after an input applies to that input, before the first input
+// to every input, after the output to the result. `output_at`: position of the output among the paths, from 1; 0: no
+// path is an output, and all edits apply to each input. Errors: kBadArgument with the edit.
 Result<EditJob> MakeEditJob(const EditFlags& flags, std::vector<std::filesystem::path> inputs, size_t output_at,
                             const ConvertOptions& options);
 
-// One file, converted and, with ConvertOptions::measure, compared in pictures of so many views.
+// Converts one file. With ConvertOptions::measure, also compares renders of `views` views.
 struct Converted {
   ConvertReport report;
   std::vector<EditStep> steps;
@@ -53,7 +53,7 @@ struct Converted {
 };
 Result<Converted> ConvertAndMeasure(const EditJob& job, const std::filesystem::path& output, int views);
 
-// What was done, as --json and Python say it, without the names of the files.
+// Report for --json and Python, without file names.
 nlohmann::json ToJson(const Converted& converted);
 
 }  // namespace anchorsplat

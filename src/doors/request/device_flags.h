@@ -15,7 +15,7 @@ namespace anchorsplat {
 
 inline constexpr const char* kDeviceGroup = "Device";
 
-// The options of every verb that rasterizes: on what, and with how much of its memory.
+// Options of verbs that rasterize: device and memory.
 struct DeviceFlags {
   DeviceChoice device;
   uint64_t max_gpu_memory = kDefaultGpuMemory;  // bytes
@@ -23,13 +23,13 @@ struct DeviceFlags {
   void AddTo(CLI::App& verb);
 };
 
-// What the device of this thread's run has to do from the making of the object on, for reports.
+// Measures the use of the device of this thread's run from construction on, for reports.
 class DeviceUse {
  public:
   DeviceUse();
 
-  // {"name": "cpu"}, or of a GPU its "name", "backend" and "type", the "seconds" for which the run waited for it and
-  // their "share" of all the time since; of either "gave_up", why the run went on on the CPU, where it did.
+  // {"name": "cpu"}; or for a GPU "name", "backend", "type", the "seconds" that the run waited for it and their "share"
+  // of the time. "gave_up": why the run continued on the CPU, if it did.
   nlohmann::json ToJson() const;
 
  private:

@@ -13,26 +13,26 @@
 
 namespace anchorsplat {
 
-// The actions on splats as options of a verb, whose order counts.
+// Edits of splats as options of a verb. Their order matters.
 struct EditFlags {
   std::string axes = std::string(kTypedActionAxes);
   bool dry_run = false;
   const CLI::App* verb = nullptr;
-  const CLI::Option* paths = nullptr;  // of the verb: files, among which actions stand; null: it has none
+  const CLI::Option* paths = nullptr;  // the verb's files, between which edits may stand; null: none
   std::vector<CLI::Option*> options;   // in the order of ActionNames
   CLI::Option* axes_option = nullptr;
 
   void AddTo(CLI::App& on);
 };
 
-// What was asked for, in its order. One list more than there are paths: those before the first path, behind the first
-// one, and so on. Errors: kBadArgument with the action, or where --action-axes has no effect.
+// The edits in order, in one list more than there are paths: before the first path, after the first path, and so on.
+// Errors: kBadArgument with the edit, or if --action-axes has no effect.
 Result<std::vector<std::vector<EditAction>>> ActionsAmongPaths(const EditFlags& flags);
 
-// RDF, LUF and so on, of --action-axes. Errors: kBadArgument.
+// Parses --action-axes, such as RDF or LUF. Errors: kBadArgument.
 Result<Axes> ParseActionAxes(const std::string& name);
 
-// What each action did, as --json and Python say it: a list.
+// What each edit did, a list for --json and Python.
 nlohmann::json ToJson(std::span<const EditStep> steps);
 
 }  // namespace anchorsplat

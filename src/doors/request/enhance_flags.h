@@ -13,7 +13,7 @@
 
 namespace anchorsplat {
 
-// The options of `enhance` that say how, not where from and where to.
+// Options of `enhance`, without input and output.
 struct EnhanceFlags {
   EnhanceOptions options;
   std::string pixel_size = "auto";
@@ -22,19 +22,19 @@ struct EnhanceFlags {
   std::string shuffles = "identity";
   std::string compat;
   std::string copies = "auto";
-  std::optional<RenderMode> mode;  // in place of the splat's own
-  std::string background;          // of --clean
+  std::optional<RenderMode> mode;  // overrides the splat's tag
+  std::string background;          // for --clean and refinement
   std::string region;
 
-  // `options.given` is left to the caller, once the verb was parsed.
+  // The caller sets `options.given` after parsing.
   void AddTo(CLI::App& verb);
 };
 
-// What they come to. `cameras`: those of --cameras where the caller has them; otherwise they are read. Errors: of
-// reading; kBadArgument with the option; those of CheckOptions (enhance/enhance.h).
+// `cameras`: those of --cameras, if already read. Errors: reading; kBadArgument with the option; those of CheckOptions
+// (enhance/enhance.h).
 Result<EnhanceOptions> MakeEnhanceOptions(const EnhanceFlags& flags, uint64_t seed, const CameraSet* cameras = nullptr);
 
-// What was done, as --json and Python say it.
+// Report for --json and Python.
 nlohmann::json ToJson(const EnhanceReport& report);
 
 }  // namespace anchorsplat

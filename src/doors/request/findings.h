@@ -7,7 +7,7 @@
 
 namespace anchorsplat {
 
-// What `info` tells, as JSON.
+// Findings of `info` as JSON.
 nlohmann::json ToJson(const SplatFindings& findings);
 nlohmann::json ToJson(const Reading& reading);
 nlohmann::json ToJson(const NetworkFindings& findings);

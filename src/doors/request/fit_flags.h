@@ -18,10 +18,10 @@
 
 namespace anchorsplat {
 
-// What a pixel of the pictures is taken to be.
+// What a pixel measures: its centre or its mean.
 enum class FitPixel { kPoint, kArea };
 
-// The options of `fit` that say how, not where from and where to.
+// Options of `fit`, without input and output.
 struct FitFlags {
   std::string checkpoint;
   int64_t checkpoint_every = 0;
@@ -32,7 +32,7 @@ struct FitFlags {
   std::string init_splat;
   std::optional<int64_t> init_points;
   double init_extent = kRandomExtent;
-  std::optional<int64_t> shell;  // nothing: auto
+  std::optional<int64_t> shell;  // unset: auto
   std::string background;
   FitPreset strategy = FitPreset::kDefault;
   bool mip_filter = false;
@@ -40,35 +40,35 @@ struct FitFlags {
   FitPixel pixel = FitPixel::kPoint;
   double upscale = 4;  // of FitPixel::kArea
 
-  // What becomes FitOptions. Those without a value keep what follows from the number of steps and the strategy.
+  // For FitOptions. Unset values follow from the number of steps and the strategy.
   int64_t steps = kDefaultFitSteps;
-  FitOptions standard = FitOptionsFor(kDefaultFitSteps);  // values whose default depends on neither
+  FitOptions standard = FitOptionsFor(kDefaultFitSteps);  // values that depend on neither
   std::optional<int64_t> sh_degree_interval, refine_start, refine_stop, refine_every, reset_every;
   std::optional<int64_t> max_gaussians;
   std::optional<double> grow_grad2d, opacity_reg, scale_reg;
 
-  std::vector<std::string> given;  // options, by their names on the command line
+  std::vector<std::string> given;  // option names
 
   void AddTo(CLI::App& verb);
 };
 
-// The options for a project whose pictures have `background`, where it says so. Errors (kBadArgument) name the option.
+// `background`: that of the project, if known. Errors (kBadArgument) name the option.
 Result<FitOptions> MakeFitOptions(const FitFlags& flags, const std::optional<std::array<float, 3>>& background,
                                   uint64_t seed);
 
-// Where the Gaussians begin, and in words.
+// Initial points, and where they come from in words.
 struct ChosenStart {
   InitialPoints points;
   std::string origin;
 };
 
-// `splat`: that of --init-splat where the caller has it. `project` is for messages. Errors: of reading; kBadArgument:
-// points of a project that has none.
+// `splat`: that of --init-splat, if already read. `project` is for messages. Errors: reading; kBadArgument: --init
+// points for a project without points.
 Result<ChosenStart> ChooseFitStart(const FitFlags& flags, const TrainingViews& views, const std::string& project,
                                    uint64_t seed, const GaussianCloud* splat = nullptr);
 
-// The Gaussians with which a fit begins: those of the start and, where --shell or the pictures ask for it, a far shell,
-// of which `options` learn. Errors: those of InitialCloud and AddFarShell.
+// Initial Gaussians: those at the initial points and, if --shell or the pictures call for it, a far shell, which is
+// noted in `options`. Errors: those of InitialCloud and AddFarShell.
 struct FirstGaussians {
   GaussianCloud cloud;
   AddedShell shell;
@@ -76,7 +76,7 @@ struct FirstGaussians {
 Result<FirstGaussians> MakeFirstGaussians(const FitFlags& flags, const TrainingViews& views, const ChosenStart& start,
                                           FitOptions& options);
 
-// What was done, as --json and Python say it.
+// Report for --json and Python.
 nlohmann::json ToJson(const FitOptions& options, const std::string& origin, const AddedShell& shell,
                       const FitReport& report);
 

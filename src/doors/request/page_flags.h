@@ -22,17 +22,17 @@ struct PageFlags {
   std::string pixel_size = "auto";
   int views = 10;
   int sh_degree = kMaxShDegree;
-  std::optional<RenderMode> mode;  // in place of the splats' own
+  std::optional<RenderMode> mode;  // overrides the tags of the splats
 
   void AddTo(CLI::App& verb);
 };
 
-// The page without its splats. `cameras`: those of --cameras where the caller has them. Errors: of reading; kNotFound:
-// no true picture; kBadArgument with the option.
+// The page without its splats. `cameras`: those of --cameras, if already read. Errors: reading; kNotFound: no
+// ground-truth picture; kBadArgument with the option.
 Result<ViewerPage> MakePage(const PageFlags& flags, const CameraSet* cameras = nullptr);
 
-// What a page that has its splats says about them: a training pixel, where none was given, of what it looked like
-// before. Warns when its first view shows nothing.
+// Completes a page that has its splats: estimates a missing training pixel from the splat before. Warns if the first
+// view is empty.
 void LookAtSplats(ViewerPage& page);
 
 }  // namespace anchorsplat

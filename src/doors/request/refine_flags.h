@@ -9,7 +9,7 @@ namespace anchorsplat {
 
 inline constexpr const char* kRefineGroup = "Refinement";
 
-// The options of refinement, as the group kRefineGroup, into `options`; `resume` and `checkpoint` into `control`.
+// Adds the options of refinement in the group kRefineGroup; `resume` and `checkpoint` go into `control`.
 void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& control);
 
 }  // namespace anchorsplat

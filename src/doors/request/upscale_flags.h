@@ -10,9 +10,9 @@
 
 namespace anchorsplat {
 
-// The options of `upscale` that say how.
+// How to upscale.
 struct UpscaleFlags {
-  std::string network;     // a file that scripts/fetch-upscaler.sh makes
+  std::string network;     // file of scripts/fetch-upscaler.sh
   int factor = 0;          // 0: the network's
   std::string background;  // "R,G,B"; empty: black
   AlphaEnlargement alpha = AlphaEnlargement::kNetwork;
@@ -23,10 +23,10 @@ struct UpscaleFlags {
 // Errors name the option.
 Result<EnlargeOptions> MakeEnlargeOptions(const UpscaleFlags& flags, const UpscalerInfo& network);
 
-// Of the network: architecture, scale, source, licence.
+// Architecture, scale, source and licence of the network.
 nlohmann::json ToJson(const UpscalerInfo& network);
 
-// What a picture that a network enlarged says of itself.
+// Comment stored in an enlarged picture.
 std::string EnlargedComment(const UpscalerInfo& network, int factor);
 
 }  // namespace anchorsplat

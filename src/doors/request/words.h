@@ -8,11 +8,11 @@
 
 namespace anchorsplat {
 
-// The options that the user gave, by their names without dashes.
+// Names of the options that the user gave, without dashes.
 std::vector<std::string> GivenOptions(const CLI::App& verb);
 
-// Reads the words of a request ("--upscale=2") into what was declared for `verb`, with the checks and in the words of
-// the command line. Errors: kBadArgument.
+// Parses the words of a request ("--upscale=2") with the options declared for `verb`, so with the checks and messages
+// of the command line. Errors: kBadArgument.
 Status ParseWords(CLI::App& verb, std::vector<std::string> words);
 
 }  // namespace anchorsplat

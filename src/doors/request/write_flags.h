@@ -6,7 +6,7 @@
 
 namespace anchorsplat {
 
-// How a splat goes into a file: --sort and --spz-version, the option that is returned.
+// Adds --sort and --spz-version; returns the latter.
 CLI::Option* AddWriteFlags(CLI::App& verb, CloudWriteOptions& write);
 
 }  // namespace anchorsplat

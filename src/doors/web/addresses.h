@@ -6,8 +6,8 @@
 
 namespace anchorsplat::web {
 
-// Whether enhancing this splat fits into the 4 GB of addresses that a module of WebAssembly has: said before the work,
-// not after it. Always, where addresses have 64 bits. Errors: kIo, with what takes less.
+// Checks before the work whether enhancing this splat fits into the 4 GB of a WebAssembly module. Always true with
+// 64-bit addresses. Errors: kIo, with what needs less.
 Status CheckAddresses(const GaussianCloud& cloud, const EnhanceOptions& options);
 
 }  // namespace anchorsplat::web

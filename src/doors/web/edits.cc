@@ -20,7 +20,7 @@ namespace anchorsplat::web {
 
 namespace {
 
-// As a splat is before its first edit. `rows` and `extras` must outlive it.
+// A splat before its first edit. `rows` and `extras` must outlive it.
 EditedSplat Unedited(const CloudView& cloud, RowSource& rows, const ExtraProperties& extras) {
   return {.name = "the splat",
           .rows = &rows,
@@ -30,7 +30,7 @@ EditedSplat Unedited(const CloudView& cloud, RowSource& rows, const ExtraPropert
           .kept = cloud.size()};
 }
 
-// Where the actions take the world.
+// The map from old to new world coordinates.
 Result<Similarity> WorldAfter(const std::vector<EditAction>& actions) {
   std::vector<EditAction> moves;
   std::ranges::copy_if(actions, std::back_inserter(moves), [](const EditAction& action) {

@@ -9,7 +9,7 @@
 
 namespace anchorsplat::web {
 
-// What a request asks to be done to a splat, by its words, in their order.
+// The edits of a request, in order.
 struct Edits {
   std::vector<EditAction> actions;
   bool count_only = false;  // --dry-run
@@ -19,12 +19,12 @@ Result<Edits> EditsOf(const Json& request);
 
 struct Edited {
   GaussianCloud cloud;
-  Json report;  // {"actions": what each took away, "world": {"rotation": row-major, "translation", "scale"}}
+  Json report;  // {"actions": what each removed, "world": {"rotation": row-major, "translation", "scale"}}
 };
-// Errors: those of EditClouds; kBadArgument where nothing is left.
+// Errors: those of EditClouds; kBadArgument if nothing is left.
 Result<Edited> EditCloud(const GaussianCloud& cloud, const std::vector<EditAction>& actions);
 
-// What each would take away, which may be all. Errors: those of ApplyActions.
+// What each would remove, which may be everything. Errors: those of ApplyActions.
 Result<Json> CountEdits(const GaussianCloud& cloud, const std::vector<EditAction>& actions);
 
 }  // namespace anchorsplat::web

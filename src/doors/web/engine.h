@@ -19,25 +19,25 @@
 
 namespace anchorsplat::web {
 
-// What a call answers: an object in JSON, and bytes that belong to it, in blocks. Blocks are valid until the next call.
+// Answer of a call: a JSON object, and blocks of bytes, which are valid until the next call.
 struct Reply {
   std::string json;
   std::vector<std::span<const std::byte>> blocks;
 };
 
-// How far a long call has come: the task's name, steps done and in all (0: unknown), a short note.
+// Progress of a long call: name of the task, steps done, total steps (0: unknown), a short note.
 using ProgressListener = std::function<void(std::string_view task, int64_t done, int64_t total, std::string_view note)>;
 
-// The program as a page or a script of Node calls it: splats by numbers, requests and answers in JSON, large data as
-// blocks of bytes. Nothing is read from or written to disk but what Cameras() puts into a temporary folder.
+// The engine for web pages and Node scripts: splats are numbers, requests and answers JSON, large data blocks of bytes.
+// Only Cameras() uses the disk, for a temporary folder.
 //
 //   {"verb": "open", "name": "scan.ply"} + the file         → {"cloud": 1, "gaussians": …, …}
 //   {"verb": "info", "cloud": 1}                            → what `anchorsplat info --json` says
 //   {"verb": "enhance", "cloud": 1, "words": ["--upscale=4"], "seed": 0, "cameras": 1}  → {"cloud": 2, "report": {…}}
 //   {"verb": "edit", "cloud": 1, "words": ["--up=z", "--filter-floaters"]}
 //        → as open, and {"actions": [{"action", "taken", "left"}], "world": {"rotation": [9], "translation": [3],
-//        "scale": s}}: what each took away, and where points of the old world are in the new one. With --dry-run
-//        among the words the actions alone
+//        "scale": s}}: what each edit removed, and the map from old to new world coordinates. With --dry-run
+//        among the words only the actions
 //   {"verb": "filter", "cloud": 1, "upscale": 4}            → {"gain": g}: variance that the filter adds, training
 //   pixels²
 //   {"verb": "write", "cloud": 2, "format": "spz", "words": []}  → one block: the file
@@ -53,9 +53,8 @@ using ProgressListener = std::function<void(std::string_view task, int64_t done,
 //   {"verb": "release", "cloud": 1} or {"verb": "release", "cameras": 1}
 //   {"verb": "formats"}                                     → {"formats": [{"name", "extensions", "reads", "writes"}]}
 //
-// `words` are options of the command line, with its checks and in its words. Every answer has "messages": [{"level",
-// "text"}]; one that failed has "error": {"code", "message"} instead of its result, and whatever was wrong, the engine
-// goes on.
+// `words` are options of the command line, with its checks and messages. Every answer has "messages": [{"level",
+// "text"}]. A failed call has "error": {"code", "message"} instead of a result; the engine stays usable.
 class Engine {
  public:
   explicit Engine(ProgressListener listener);
@@ -65,9 +64,9 @@ class Engine {
  private:
   struct OpenCloud {
     GaussianCloud cloud;
-    std::string name;    // of its file, for people; empty: none
+    std::string name;    // of its file, for messages; empty: none
     std::string format;  // of its file
-    FormatFacts facts;   // that it says about itself
+    FormatFacts facts;   // from the file
     uint64_t bytes = 0;  // of its file
   };
   struct Answer;
@@ -93,7 +92,7 @@ class Engine {
   ProgressListener listener_;
   std::map<int64_t, std::unique_ptr<OpenCloud>> clouds_;
   std::map<int64_t, CameraSet> cameras_;
-  int64_t last_ = 0;              // handle that was given
+  int64_t last_ = 0;              // last handle given out
   std::vector<std::byte> bytes_;  // of the last answer
   std::vector<float> floats_;
 };

@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// How to come by LibTorch, for a program in the build folder of a checkout and for an installed one.
+// How to get LibTorch, for a program in a checkout's build folder or an installed one.
 std::string TorchCommand() {
   const fs::path folder = ProgramFolder();
   if (Exists(folder.parent_path() / "scripts" / "install-torch.sh")) return "make torch build";

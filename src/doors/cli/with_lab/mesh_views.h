@@ -9,7 +9,7 @@
 
 namespace anchorsplat {
 
-// The options of every verb that makes views of a mesh.
+// Options of verbs that render views of a mesh.
 struct ViewSetFlags {
   ViewSetOptions views;
   std::string background;  // "R,G,B"; empty: black

@@ -8,7 +8,7 @@
 
 namespace anchorsplat {
 
-// The metric as OpenLpipsDistance (cli/lab.h) opens it.
+// Opens the metric for OpenLpipsDistance (cli/lab.h).
 Result<std::optional<Lpips>> OpenLpips(const std::string& net, const std::string& folder);
 
 }  // namespace anchorsplat

@@ -10,11 +10,11 @@
 #include "core/parallel.h"
 #include "web/engine.h"
 
-// What JavaScript sees of the engine: memory for a request, the
-// call, and where its answer lies.
+// The engine's interface for JavaScript: memory for a request, the
+// call, and the location of its answer.
 
-// Progress goes to the listener that the page has put into the module, which only the thread that calls knows: what
-// others have done is in its next word.
+// Progress goes to the listener in the module, which only the calling thread can reach. It includes the steps of other
+// threads.
 EM_JS_DEPS(anchorsplat_tell_needs, "$UTF8ToString");
 // clang-format off
 EM_JS(void, anchorsplat_tell, (const char* task, double done, double total, const char* note), {
@@ -44,10 +44,10 @@ Reply& LastReply() {
 
 extern "C" {
 
-// Threads that loops may use, of as many as the module was started with; a module without threads has one.
+// Threads for loops, at most as many as the module was started with; one in a module without threads.
 EMSCRIPTEN_KEEPALIVE void anchorsplat_threads(int threads) { anchorsplat::SetThreadCount(threads); }
 
-// Null where there is not so much memory.
+// Null if there is not enough memory.
 EMSCRIPTEN_KEEPALIVE void* anchorsplat_allocate(size_t bytes) { return std::malloc(bytes); }
 EMSCRIPTEN_KEEPALIVE void anchorsplat_free(void* memory) { std::free(memory); }
 

@@ -1,5 +1,5 @@
-// Writes damaged files of all kinds that are read, one block after the other: web_mutants OUT COUNT SEED. In front of
-// each stands its length, 4 bytes, low byte first.
+// Writes damaged files of all readable formats in one file: web_mutants OUT COUNT SEED. Each is preceded by its length,
+// 4 bytes, little-endian.
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>

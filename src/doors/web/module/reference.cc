@@ -1,5 +1,5 @@
-// Answers the requests of a file with the engine as this machine's own processor runs it, for what is compared with the
-// module (scripts/web/test.mjs): web_reference REQUESTS OUT
+// Answers the requests of a file with the native engine, for comparison with the module (scripts/web/test.mjs):
+// web_reference REQUESTS OUT
 //
 // Every line of REQUESTS is a request; its "data", if any, is the path of a file with the bytes. The answer to line k
 // goes to OUT/k.json and its blocks to OUT/k-0.bin, OUT/k-1.bin, …; "seconds" is added to it. One thread, and no wider

@@ -26,22 +26,22 @@ def _numbers(name: str, values: Any) -> npt.NDArray[np.float64]:
         values = values.detach().cpu()
     array = np.array(values, dtype=np.float64)
     if not np.isfinite(array).all():
-        raise BadArgumentError(f"{name}: values that are not finite")
+        raise BadArgumentError(f"{name}: some values are not finite")
     return array
 
 
 class Cameras:
-    """V cameras without distortion in OpenCV axes (x right, y down, z forward), which do not change. Of a file with a lens they
-    are those of the pinholes that its pictures are undone to (docs/fit.md).
+    """V pinhole cameras in OpenCV axes (x right, y down, z forward); immutable. If the file has lens distortion, they are the
+    pinholes of the undistorted pictures (docs/fit.md).
 
-    Pixel (0,0) covers [0,1)², its centre is at 0.5. ``cameras[3]`` and ``cameras[::8]`` are cameras, too.
+    Pixel (0,0) covers [0,1)², its centre is at 0.5. ``cameras[3]`` and ``cameras[::8]`` are Cameras, too.
     """
 
     __slots__ = ("_set",)
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        """Those of a transforms.json, an INRIA cameras.json, a poses_bounds.npy, a COLMAP model, or a file of Metashape, OpenSfM
-        or Bundler, or of a folder with one of them, in their order. Raises NotFoundError, IoError, BadFileError;
+        """Reads cameras, in their order, from a transforms.json, an INRIA cameras.json, a poses_bounds.npy, a COLMAP model, a
+        Metashape, OpenSfM or Bundler file, or a folder with one of these. Raises NotFoundError, IoError, BadFileError;
         BadArgumentError: a folder with several."""
         with run() as how:
             self._set = _core.read_cameras(path_bytes(path), how)
@@ -63,13 +63,13 @@ class Cameras:
         names: Sequence[str] | None = None,
         background: Color | None = None,
     ) -> Cameras:
-        """Cameras of arrays, as gsplat has them.
+        """Cameras from arrays, as in gsplat.
 
         `world_to_camera`: [V,4,4] or [V,3,4], OpenCV axes, world units (gsplat's viewmats); `intrinsics`: [V,3,3] or [3,3] in
-        pixels (gsplat's Ks); `width` and `height` in pixels, of all or of each; `names`: "000", "001", … otherwise;
-        `background`: r, g, b from 0 to 1, of the pictures that they took.
+        pixels (gsplat's Ks); `width` and `height` in pixels, one number or one per camera; `names`: default "000", "001", …;
+        `background` of the pictures: r, g, b from 0 to 1.
 
-        Raises BadArgumentError: shapes that do not fit, a matrix that is no rotation, sizes below 1.
+        Raises BadArgumentError: wrong shapes, a matrix that is not a rotation, sizes below 1.
         """
         poses = _numbers("world_to_camera", world_to_camera)
         if poses.ndim == 2:
@@ -83,7 +83,7 @@ class Cameras:
         skew = np.abs(turned @ turned.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2)) > 1e-3
         wrong = np.flatnonzero(skew | (np.linalg.det(turned) < 0))
         if len(wrong):
-            raise BadArgumentError(f"world_to_camera: the upper 3 x 3 of camera {wrong[0]} is no rotation")
+            raise BadArgumentError(f"world_to_camera: the upper 3 x 3 of camera {wrong[0]} is not a rotation")
         matrices = _numbers("intrinsics", intrinsics)
         if matrices.shape == (3, 3):
             matrices = np.tile(matrices, (count, 1, 1))
@@ -118,10 +118,10 @@ class Cameras:
         target: Sequence[float] | None = None,
         up: str | Sequence[float] | None = None,
     ) -> Cameras:
-        """`count` cameras on a sphere around a splat, upright as far as its comments say where up is.
+        """`count` cameras on a sphere around a splat. Up is that of its comments, else −y.
 
-        `size`: width and height in pixels; `fov`: horizontal field of view, degrees; `radius`: distance, world units,
-        otherwise from where the splat fills the picture; `target`: x, y, z to look at; `up`: x, y, z or an axis such as "-z".
+        `size`: width and height in pixels; `fov`: horizontal field of view, degrees; `radius`: distance, world units (default:
+        the splat fills the picture); `target`: x, y, z to look at; `up`: x, y, z or an axis such as "-z".
         """
         words = words_of(cls.orbit.__func__, locals())  # type: ignore[attr-defined]
         if isinstance(size, (str, bytes)) or not hasattr(size, "__len__") or len(size) != 2:
@@ -135,7 +135,7 @@ class Cameras:
 
     @property
     def names(self) -> list[str]:
-        """Of the views."""
+        """Names of the views."""
         return list(self._set.names())
 
     @property
@@ -155,7 +155,7 @@ class Cameras:
 
     @property
     def background(self) -> tuple[float, float, float] | None:
-        """r, g, b from 0 to 1 where their file says which one the pictures have."""
+        """Background of the pictures, r, g, b from 0 to 1; None if the file does not give it."""
         background = self._set.background()
         return None if background is None else (background[0], background[1], background[2])
 
@@ -185,12 +185,12 @@ def _unpickled(poses: Any, intrinsics: Any, width: Any, height: Any, names: Any,
     return Cameras.from_arrays(poses, intrinsics, width, height, names=names, background=background)
 
 
-#: What functions take for cameras: cameras, or a file or folder with them.
+#: Cameras, or a file or folder with cameras.
 CamerasLike = Union[Cameras, str, "os.PathLike[str]"]
 
 
 def camera_words(cameras: CamerasLike | None, words: list[bytes]) -> _core.CameraSet | None:
-    """The cameras, where they are in memory; adds the word that says them."""
+    """Adds the --cameras option; returns cameras that are in memory."""
     if cameras is None:
         return None
     if isinstance(cameras, Cameras):

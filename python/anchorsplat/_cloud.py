@@ -16,17 +16,17 @@ if TYPE_CHECKING:
 
     FloatArray = npt.NDArray[np.float32]
 
-#: How a splat wants to be drawn: as 3DGS does it (Kerbl et al. 2023), where every Gaussian is widened by 0.3 px²; with
-#: opacity compensated for that (gsplat's "antialiased"); or compensated for 0.1 px² (Mip-Splatting).
+#: Rasterization: "classic" widens every Gaussian by 0.3 px² (Kerbl et al. 2023); "antialiased" also compensates its opacity, as
+#: gsplat does; "mip" compensates for 0.1 px² (Mip-Splatting).
 RenderMode = Literal["classic", "antialiased", "mip"]
 
-_MOST_SHOWN = 500_000  # Gaussians in a notebook that nobody asked to show them: 3.5 MB
+_MOST_SHOWN = 500_000  # a notebook shows larger splats on request only; 3.5 MB
 
 _MODES = (None, "classic", "antialiased", "mip")
 
 
 def _column(name: str, values: Any, shape: tuple[int | None, ...]) -> FloatArray:
-    if hasattr(values, "detach"):  # a tensor of torch's
+    if hasattr(values, "detach"):  # a PyTorch tensor
         values = values.detach().cpu()
     array = np.asarray(values)
     if array.dtype.kind not in "fiu":
@@ -49,19 +49,18 @@ def _point(name: str, values: Sequence[float]) -> tuple[float, float, float]:
 
 
 class Cloud(Edits["Cloud"]):
-    """A splat: N Gaussians as five NumPy arrays of float32, row i of each belonging to Gaussian i.
+    """A splat: N Gaussians in five NumPy arrays of float32. Row i of each array is Gaussian i.
 
-    Values are *stored* ones, before activation, exactly as an INRIA PLY keeps them. The arrays of what this package returns
-    are views of the engine's buffers, without a copy, and keep them alive; values may be changed in place, the number of
-    Gaussians and the degree are fixed. Everything that speaks DLPack shares their memory:
-    ``torch.from_dlpack(cloud.means)``.
+    Values are those before activation, as stored in an INRIA PLY. You can change them in place; the number of Gaussians and the
+    SH degree are fixed. Arrays returned by this package are views of the engine's buffers, without a copy. DLPack shares
+    their memory: ``torch.from_dlpack(cloud.means)``.
 
-    A Cloud of your own arrays borrows those that are float32 and C-contiguous in the CPU's memory and copies the others. No
-    array may be changed while a call works with it; any number of calls may look at it at the same time.
+    A Cloud made of your own arrays shares those that are float32, C-contiguous and in CPU memory, and copies the others. Do
+    not change an array while a call uses it. Several calls may read it at the same time.
 
-    Edits, as :meth:`translate` and :meth:`crop`, give a new Cloud each; :meth:`edit` gathers several, for a single copy.
+    Each edit, such as :meth:`translate` or :meth:`crop`, returns a new Cloud. :meth:`edit` chains several with a single copy.
 
-    Raises BadArgumentError for arrays that do not fit together.
+    Raises BadArgumentError for arrays of the wrong shape or type.
     """
 
     __slots__ = (
@@ -97,10 +96,10 @@ class Cloud(Edits["Cloud"]):
         for name in ("log_scales", "quats", "opacity_logits", "sh"):
             rows = len(getattr(self, name))
             if rows != count:
-                raise BadArgumentError(f"{name}: {rows} rows, and means has {count}")
+                raise BadArgumentError(f"{name}: {rows} rows, but means has {count}")
         if self._sh.shape[1] not in (1, 4, 9, 16):
             raise BadArgumentError(
-                f"sh: {self._sh.shape[1]} coefficients; expected 1, 4, 9 or 16, those of degree 0 to 3"
+                f"sh: {self._sh.shape[1]} coefficients; expected 1, 4, 9 or 16 (degree 0 to 3)"
             )
         self.render_mode = render_mode
         self._comments = tuple(comments)
@@ -119,14 +118,14 @@ class Cloud(Edits["Cloud"]):
         comments: Sequence[str] = (),
         origin: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> Cloud:
-        """A Cloud of your own arrays: what ``Cloud(...)`` is, too."""
+        """A Cloud of your own arrays; the same as ``Cloud(...)``."""
         return cls(
             means, log_scales, quats, opacity_logits, sh, render_mode=render_mode, comments=comments, origin=origin
         )
 
     @classmethod
     def _of(cls, parts: tuple[Any, ...]) -> Cloud:
-        """Of what the engine returns, which fits together."""
+        """From the arrays that the engine returns, unchecked."""
         cloud = cls.__new__(cls)
         (_, cloud._means, cloud._log_scales, cloud._quats, cloud._opacity_logits, cloud._sh) = parts[:6]
         cloud._render_mode = parts[6]
@@ -136,12 +135,12 @@ class Cloud(Edits["Cloud"]):
 
     @property
     def means(self) -> FloatArray:
-        """[N,3] centres, world units, from :attr:`origin` on."""
+        """[N,3] centres in world units, relative to :attr:`origin`."""
         return self._means
 
     @property
     def log_scales(self) -> FloatArray:
-        """[N,3] ln(world units), one per axis of the rotation. −inf is legal: flat."""
+        """[N,3] ln(world units), one per axis of the rotation. −inf is valid: flat."""
         return self._log_scales
 
     @property
@@ -166,30 +165,30 @@ class Cloud(Edits["Cloud"]):
 
     @property
     def render_mode(self) -> RenderMode | None:
-        """How it wants to be drawn; None where nobody said. May be set."""
+        """Rasterization that the splat was trained for; None if unknown. Can be set."""
         return self._render_mode
 
     @render_mode.setter
     def render_mode(self, mode: RenderMode | None) -> None:
         if mode not in _MODES:
-            raise BadArgumentError(f"render_mode: {mode!r} is none of classic, antialiased, mip or None")
+            raise BadArgumentError(f"render_mode: {mode!r} is not classic, antialiased, mip or None")
         self._render_mode = mode
 
     @property
     def comments(self) -> tuple[str, ...]:
-        """Of the file, and of what was done to the splat."""
+        """Comments of the file, and of what was done to the splat."""
         return self._comments
 
     @property
     def origin(self) -> tuple[float, float, float]:
-        """What a centre is relative to: its world position is ``numpy.asarray(cloud.origin) + cloud.means``, in float64. Zero,
-        but for coordinates that are too large for float32, such as those of maps. Cameras, regions and orbits are in the world.
-        """
+        """World position that :attr:`means` are relative to: ``numpy.asarray(cloud.origin) + cloud.means`` in float64 gives world
+        positions. Zero unless coordinates are too large for float32, as on maps. Cameras, regions and orbits are in world
+        coordinates."""
         return self._origin
 
     @property
     def nbytes(self) -> int:
-        """Of the five arrays."""
+        """Size of the five arrays."""
         return sum(a.nbytes for a in (self._means, self._log_scales, self._quats, self._opacity_logits, self._sh))
 
     def __len__(self) -> int:
@@ -198,7 +197,7 @@ class Cloud(Edits["Cloud"]):
     def __getitem__(self, rows: Any) -> Cloud:
         """Some of the Gaussians: a slice (a view), a mask or indices (copies)."""
         if isinstance(rows, (int, np.integer)):
-            row = range(len(self))[int(rows)]  # IndexError, where there is none
+            row = range(len(self))[int(rows)]  # or IndexError
             rows = slice(row, row + 1)
         return Cloud(
             self._means[rows],
@@ -212,14 +211,14 @@ class Cloud(Edits["Cloud"]):
         )
 
     def __iter__(self) -> Iterator[Cloud]:
-        """Gaussian by Gaussian, each a Cloud of one. The arrays are the fast way."""
+        """One Cloud per Gaussian. Using the arrays is faster."""
         return (self[row] for row in range(len(self)))
 
     def __array__(self, *_: Any, **__: Any) -> Any:
         raise TypeError("a Cloud is five arrays: cloud.means, log_scales, quats, opacity_logits and sh")
 
     def copy(self) -> Cloud:
-        """The same with arrays of its own."""
+        """A copy with its own arrays."""
         return Cloud(
             self._means.copy(),
             self._log_scales.copy(),
@@ -232,12 +231,12 @@ class Cloud(Edits["Cloud"]):
         )
 
     def edit(self, *, axes: str = "RDF") -> Edit:
-        """Begins a chain of edits, which copies once: :func:`anchorsplat.edit`."""
+        """Starts a chain of edits with a single copy (:func:`anchorsplat.edit`)."""
         return edit(self, axes=axes)
 
     def merge(self, *others: Cloud | Edit) -> Cloud:
-        """A new one with the Gaussians of others behind these, of the higher SH degree. Marks and render modes are those of all
-        (docs/edit.md)."""
+        """A new Cloud with these Gaussians followed by those of others, with the highest SH degree. docs/edit.md says what becomes
+        of marks and render modes."""
         return self.edit().merge(*others).apply()[0]
 
     def _edited(self, name: str, text: str, axes: str | None) -> Cloud:
@@ -245,16 +244,16 @@ class Cloud(Edits["Cloud"]):
 
     @classmethod
     def from_gsplat(cls, params: Mapping[str, Any]) -> Cloud:
-        """Of gsplat's parameters, as its trainer and its checkpoints have them: tensors or arrays "means" [N,3], "scales" [N,3]
+        """A Cloud of gsplat's parameters, as in its trainer and checkpoints: tensors or arrays "means" [N,3], "scales" [N,3]
         (logarithms), "quats" [N,4] (wxyz), "opacities" [N] (logits), "sh0" [N,1,3] and "shN" [N,K−1,3], or a dictionary with
-        them under "splats". Shares memory where it can; harmonics are copied. Raises BadArgumentError."""
+        them under "splats". Harmonics are copied; the others share memory if possible. Raises BadArgumentError."""
         from ._gsplat import from_gsplat
 
         return from_gsplat(params)
 
     def to_gsplat(self, arrays: Literal["torch", "numpy"] = "torch") -> dict[str, Any]:
-        """The parameters of gsplat's trainer, by its names and in its layout (see :meth:`from_gsplat`): tensors that share this
-        Cloud's memory, or NumPy's arrays; "means" are relative to :attr:`origin`. To train, make them parameters of their own:
+        """The parameters of gsplat's trainer, with its names and layout (see :meth:`from_gsplat`), as tensors or NumPy arrays that
+        share this Cloud's memory. "means" are relative to :attr:`origin`. To train, copy them:
         ``torch.nn.Parameter(t.clone())``."""
         from ._gsplat import to_gsplat
 
@@ -264,10 +263,10 @@ class Cloud(Edits["Cloud"]):
         from ._view import view
 
         if len(self) > _MOST_SHOWN:
-            return f"<p>{html.escape(repr(self))}, too many to show unasked: <code>anchorsplat.view(cloud)</code> does.</p>"
+            return f"<p>{html.escape(repr(self))}, too many to show automatically: call <code>anchorsplat.view(cloud)</code>.</p>"
         try:
             return view(self)._repr_html_()
-        except Error as error:  # there is nothing to be seen of it
+        except Error as error:  # nothing of it can be shown
             return f"<p>{html.escape(repr(self))}: {html.escape(str(error))}</p>"
 
     def __repr__(self) -> str:

@@ -1,4 +1,4 @@
-"""How alike pictures and splats are."""
+"""Measures of similarity between pictures and splats."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ._report import Report
 from ._run import DeviceLike, ProgressLike, run
 from ._words import path_bytes, words_of
 
-#: A splat, pictures [V,H,W,C] or [H,W,C], or a path: a splat's file, a folder of pictures or a picture.
+#: A splat, pictures [V,H,W,C] or [H,W,C], or the path of a splat, a picture or a folder of pictures.
 Comparable = Union[Cloud, PathLike, "npt.ArrayLike"]
 
 
@@ -35,7 +35,7 @@ def _pictures(name: str, values: Any) -> npt.NDArray[np.float32]:
     if array.dtype == np.uint8:
         array = array.astype(np.float32) / np.float32(255)
     elif array.dtype.kind in "iu" and array.size > 0 and array.max() > 1:
-        raise BadArgumentError(f"{name}: {array.dtype} with values up to {array.max()}: give uint8, or floats from 0 to 1")
+        raise BadArgumentError(f"{name}: {array.dtype} with values up to {array.max()}: pass uint8, or floats from 0 to 1")
     array = np.ascontiguousarray(array, dtype=np.float32)
     return array if array.ndim == 4 else array[None]
 
@@ -50,22 +50,22 @@ def _measure(a: npt.ArrayLike, b: npt.ArrayLike, ssim: bool, threads: int) -> An
 
 
 def psnr(a: npt.ArrayLike, b: npt.ArrayLike, *, threads: int = 0) -> Any:
-    """Peak signal-to-noise ratio in dB of two pictures [H,W,C], a float, or of two rows of them [V,H,W,C], an array [V].
+    """Peak signal-to-noise ratio in dB: a float for two pictures [H,W,C], an array [V] for two stacks of pictures [V,H,W,C].
 
-    Over the first three channels, peak 1 (255 of uint8), infinite for equal pictures. Values are taken as they are: clip
-    renders first. Raises BadArgumentError for shapes that differ.
+    Uses the first three channels; the peak is 1 (255 for uint8). Infinite for equal pictures. Values are not clipped: clip
+    renders first. Raises BadArgumentError if the shapes differ.
     """
     return _measure(a, b, False, threads)
 
 
 def ssim(a: npt.ArrayLike, b: npt.ArrayLike, *, threads: int = 0) -> Any:
-    """Mean structural similarity (Wang et al. 2004, 11×11 Gaussian window), otherwise as :func:`psnr`."""
+    """Mean structural similarity (Wang et al. 2004, 11×11 Gaussian window); arguments as for :func:`psnr`."""
     return _measure(a, b, True, threads)
 
 
 def sheet(pictures: Mapping[str, npt.ArrayLike], *, threads: int = 0) -> npt.NDArray[np.float32]:
-    """A picture for people, [H,W,3]: a column per picture [H,W,C] with its name, the part enlarged where they differ most, and
-    the differences to the last one. Raises BadArgumentError: none, or different sizes."""
+    """A side-by-side picture [H,W,3]: a column per picture [H,W,C] with its name, the part where they differ most, enlarged, and
+    the difference to the last one. Raises BadArgumentError: no pictures, or different sizes."""
     arrays = [_pictures(name, picture)[:1] for name, picture in pictures.items()]
     with run(threads) as how:
         made = cast("npt.NDArray[np.float32]", _core.sheet(list(pictures), arrays, how))
@@ -107,14 +107,14 @@ def compare(
     """PSNR and SSIM of two splats, folders of pictures or arrays of them, view by view.
 
     `a` is compared with `b`, or both with `truth`. Each is a Cloud, pictures [V,H,W,3] in the order of the cameras, or a path.
-    Splats are seen from `cameras` or `orbit` views; all that says how is as in :func:`render`. Pictures are matched by their
-    names: of files, of the cameras, or "000", "001", ….
+    Without ground truth the numbers say how alike the two are, not which is better. Splats are rendered from `cameras` or
+    `orbit` views, with the options of :func:`render`. Pictures match by name: of the file, of the camera, or "000", "001", ….
 
-    color_correct: measures again after the affine map of each view's colours that brings it nearest to the pictures.
+    color_correct: also measure after the affine colour map of each view that brings it closest to the reference.
     device: rasterize on "cpu", "gpu", "auto" (a hardware GPU, else the CPU) or an adapter by number.
         max_gpu_memory: most GPU memory to use, bytes or "4G"; default: 2 GiB (docs/gpu.md).
 
-    Returns ``{"mean": {"psnr", "ssim"}, "views": […]}``, with `truth` one for "a" and one for "b"; an infinite PSNR is None.
+    Returns ``{"mean": {"psnr", "ssim"}, "views": […]}``, with `truth` one each under "a" and "b"; an infinite PSNR is None.
     Raises as ``read``; BadArgumentError: views that do not match, sizes that differ.
     """
     words = words_of(compare, locals(), besides=("truth", "cameras"))
@@ -128,7 +128,7 @@ def compare(
         names = cameras.names if isinstance(cameras, Cameras) else [f"{v:03d}" for v in range(count)]
         for array in arrays:
             if len(array) != len(names):
-                raise BadArgumentError(f"{len(array)} pictures and {len(names)} views")
+                raise BadArgumentError(f"{len(array)} pictures, but {len(names)} views")
     given = camera_words(cameras, words)
     with run(threads, progress, device=device, max_gpu_memory=max_gpu_memory) as how:
         return Report._of(_core.compare(sides[0], sides[1], sides[2], names, words, given, how))

@@ -1,4 +1,4 @@
-"""From one format to another."""
+"""Converts splat files."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def convert(
     threads: int = 0,
     progress: ProgressLike = None,
 ) -> Report:
-    """Converts, shrinks or sorts a splat file. Keeps extra properties of the Gaussians where the format has room for them, unlike
-    ``write(target, read(source))``.
+    """Converts, shrinks or sorts a splat file. Unlike ``write(target, read(source))``, it keeps extra properties of the Gaussians if
+    the format can store them.
 
     format: format of the source, by its extension, if neither name nor content shows it (--from on the command line).
     mode: rasterization to note in the output; default: as in the source.
@@ -63,7 +63,7 @@ def convert(
     """
     if isinstance(source, (bytes, bytearray, memoryview)) or isinstance(target, (bytes, bytearray, memoryview)):
         raise BadArgumentError(
-            "convert: expected paths, found bytes: anchorsplat.to_bytes(anchorsplat.read(data), 'spz') makes bytes of bytes"
+            "convert: expected paths, found bytes; use anchorsplat.to_bytes(anchorsplat.read(data), 'spz')"
         )
     words = words_of(convert, locals(), besides=("format",))
     if format is not None:

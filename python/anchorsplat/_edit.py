@@ -1,4 +1,4 @@
-"""Edits: what may be done to splats, one after the other."""
+"""Edits of splats."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from ._run import ProgressLike, run
 if TYPE_CHECKING:
     from ._cloud import Cloud
 
-_Made = TypeVar("_Made")  # of an edit
+_Made = TypeVar("_Made")  # result of an edit
 Comparison = Literal["lt", "lte", "gt", "gte", "eq", "neq"]
 
 
 class _Step(NamedTuple):
-    first: int  # the first cloud that it is done to
-    clouds: int  # and how many
+    first: int  # first cloud that it applies to
+    clouds: int  # number of clouds that it applies to
     name: str  # "--translate"
     text: str  # "1,0,0"
     axes: str
 
 
 def _numbers(name: str, values: Any, what: str, count: int) -> str:
-    """"1,2.5,0": every digit of them. Raises BadArgumentError."""
+    """"1,2.5,0", with all digits. Raises BadArgumentError."""
     try:
         numbers = [] if isinstance(values, (str, bytes, dict)) else [float(value) for value in values]
     except (TypeError, ValueError):
@@ -59,10 +59,10 @@ def _box(values: Any) -> str:
 
 
 class Edits(Generic[_Made]):
-    """The edits of a :class:`Cloud`, each of which gives a new one, and of an :class:`Edit`, which gathers them.
+    """Edits of a :class:`Cloud`, which return a new Cloud, and of an :class:`Edit`, which return a longer chain.
 
-    Numbers are along the axes of the arrays, RDF (x right, y down, z forward), unless `axes` says others: three letters for
-    x, y and z. With ``axes="LUF"`` they are those of the command line and of splat-transform. docs/edit.md tells more.
+    Numbers use the axes of the arrays, RDF (x right, y down, z forward), unless `axes` gives other letters for x, y and z.
+    ``axes="LUF"`` is the default of the command line and of splat-transform. More in docs/edit.md.
     """
 
     __slots__ = ()
@@ -71,30 +71,29 @@ class Edits(Generic[_Made]):
         raise NotImplementedError
 
     def translate(self, by: Sequence[float], *, axes: str | None = None) -> _Made:
-        """Moves it by (x, y, z)."""
+        """Moves the splat by (x, y, z)."""
         return self._edited("--translate", _numbers("translate", by, "x, y, z", 3), axes)
 
     def rotate(self, degrees: Sequence[float], *, axes: str | None = None) -> _Made:
-        """Turns it about the world's origin: by degrees about x first, then y, then z, all of which stand still. Harmonics turn
-        with it."""
+        """Rotates the splat about the world's origin: degrees about the fixed x axis, then y, then z. Harmonics rotate with it."""
         return self._edited("--rotate", _numbers("rotate", degrees, "degrees about x, y, z", 3), axes)
 
     def scale(self, factor: float) -> _Made:
-        """Scales it about the world's origin, positions and lengths."""
+        """Scales positions and lengths about the world's origin."""
         return self._edited("--scale", _number("scale", factor), None)
 
     def mirror(self, axis: Literal["x", "y", "z"], *, axes: str | None = None) -> _Made:
-        """Mirrors it along an axis; the plane through the origin stays."""
+        """Mirrors the splat along an axis, at the plane through the origin."""
         return self._edited("--mirror", str(axis), axes)
 
     def turn_up(self, direction: str | Sequence[float], *, axes: str | None = None) -> _Made:
-        """Turns it the shortest way so that a direction (x, y, z), or an axis as "-z", becomes up, and says so in a comment. Up is
-        −y of the arrays. The command line's ``--up``."""
+        """Rotates the splat the shortest way so that a direction (x, y, z), or an axis such as "-z", becomes up (−y of the arrays),
+        and records it in a comment. ``--up`` on the command line."""
         text = direction if isinstance(direction, str) else _numbers("turn_up", direction, "x, y, z or an axis", 3)
         return self._edited("--up", text, axes)
 
     def move_origin(self, point: Sequence[float], *, axes: str | None = None) -> _Made:
-        """Moves it so that a point becomes 0, 0, 0. The command line's ``--origin``."""
+        """Moves the splat so that a point becomes 0, 0, 0. ``--origin`` on the command line."""
         return self._edited("--origin", _numbers("move_origin", point, "x, y, z", 3), axes)
 
     def crop(
@@ -104,8 +103,8 @@ class Edits(Generic[_Made]):
         sphere: Sequence[float] | None = None,
         axes: str | None = None,
     ) -> _Made:
-        """Keeps what lies in a box, (x0, y0, z0, x1, y1, z1) with the lower corner first, where None or infinity is no border; or
-        what lies in a sphere (x, y, z, radius)."""
+        """Keeps Gaussians in a box (x0, y0, z0, x1, y1, z1) or in a sphere (x, y, z, radius). The box starts with its lower corner;
+        None or infinity means no bound."""
         if (box is None) == (sphere is None):
             raise BadArgumentError("crop: expected either a box or a sphere")
         if box is not None:
@@ -113,16 +112,16 @@ class Edits(Generic[_Made]):
         return self._edited("--filter-sphere", _numbers("sphere", sphere, "x, y, z, radius", 4), axes)
 
     def remove_box(self, box: Sequence[float | None] | Sequence[Sequence[float]], *, axes: str | None = None) -> _Made:
-        """Drops what lies in a box, which is said as for :meth:`crop`."""
+        """Drops Gaussians in a box, given as for :meth:`crop`."""
         return self._edited("--remove-box", _box(box), axes)
 
     def filter_nan(self) -> _Made:
-        """Drops Gaussians with a value that is no number or infinite, or a quaternion of zero."""
+        """Drops Gaussians with NaN or infinite values, or a zero quaternion."""
         return self._edited("--filter-nan", "", None)
 
     def filter_value(self, property: str, comparison: Comparison, value: float, *, axes: str | None = None) -> _Made:
-        """Keeps Gaussians of which ``property comparison value`` holds, by the names of a PLY: x, opacity (0 to 1), scale_0 (a
-        length), f_dc_0 (a colour, 0 to 1), rot_0, f_rest_0; with _raw behind the name the value is the stored one."""
+        """Keeps Gaussians for which ``property comparison value`` holds. Properties are named as in a PLY: x, opacity (0 to 1),
+        scale_0 (a length), f_dc_0 (a colour, 0 to 1), rot_0, f_rest_0. With _raw appended, the stored value is compared."""
         return self._edited("--filter-value", f"{property},{comparison},{_number('filter_value', value)}", axes)
 
     def filter_harmonics(self, degree: int) -> _Made:
@@ -130,16 +129,16 @@ class Edits(Generic[_Made]):
         return self._edited("--filter-harmonics", str(degree), None)
 
     def filter_floaters(self, factor: float = 1) -> _Made:
-        """Drops Gaussians that hang in the air. A factor above 1 finds fewer, one below 1 more of them."""
+        """Drops isolated Gaussians (floaters). A factor above 1 drops fewer, below 1 more."""
         text = _number("filter_floaters", factor)
         return self._edited("--filter-floaters", "" if text == "1" else text, None)
 
 
 class Edit(Edits["Edit"]):
-    """Edits to come, of one splat or of several that become one: :func:`edit` begins it, every method gives a longer one, and
-    :meth:`apply` does all of it with a single copy. Nothing is done before; each value is rounded once.
+    """A chain of edits of one splat, or of several to merge. :func:`edit` starts it, each method returns a longer chain, and
+    :meth:`apply` runs it with a single copy and a single rounding.
 
-    Raises BadArgumentError at once for numbers that make no sense.
+    Methods raise BadArgumentError at once for invalid numbers.
     """
 
     __slots__ = ("_axes", "_clouds", "_steps")
@@ -155,8 +154,8 @@ class Edit(Edits["Edit"]):
         return Edit(self._clouds, self._axes, (*self._steps, step))
 
     def merge(self, *others: Cloud | Edit) -> Edit:
-        """Puts the Gaussians of others behind these. An :class:`Edit` among them is done to its own ones only; what follows here
-        is done to all."""
+        """Appends the Gaussians of others. The edits of an :class:`Edit` among them apply to its own Gaussians only; later edits apply
+        to all."""
         clouds, steps = list(self._clouds), list(self._steps)
         for other in others:
             if isinstance(other, Edit):
@@ -168,11 +167,11 @@ class Edit(Edits["Edit"]):
         return Edit(clouds, self._axes, steps)
 
     def apply(self, *, threads: int = 0, progress: ProgressLike = None) -> tuple[Cloud, Report]:
-        """Does them all. The splats stay as they are.
+        """Runs all edits. The splats given are not changed.
 
-        Returns the result, which may have no Gaussians, and a :class:`Report`: ``report["actions"]`` says of each what it has
-        taken away and what was left. threads: at most; 0: all of the machine; the result does not depend on it. Raises
-        BadArgumentError for a property that a splat has not.
+        Returns the result, which may have no Gaussians, and a :class:`Report`, whose ``report["actions"]`` counts the Gaussians
+        that each edit removed and left. threads: CPU threads, 0: all; the result does not depend on them. Raises
+        BadArgumentError for a property that a splat does not have.
         """
         from ._cloud import Cloud
 
@@ -193,18 +192,18 @@ def _check_is_cloud(thing: object) -> None:
 
 
 def edit(*clouds: Cloud, axes: str = "RDF") -> Edit:
-    """Begins edits of a splat, or of several that become one.
+    """Starts a chain of edits of a splat, or of several to merge.
 
         small, report = anchorsplat.edit(cloud).rotate((0, 90, 0)).scale(0.5).crop(sphere=(0, 0, 0, 3)).apply()
 
-    axes: those along which the numbers of the edits are, for x, y and z each Right or Left, Up or Down, Front or Back: "RDF",
-    those of the arrays; "LUF", those of the command line.
+    axes: axes of the numbers in edits, for x, y and z one of Right or Left, Up or Down, Front or Back: "RDF" as in the arrays,
+    "LUF" as on the command line.
 
-    Raises BadArgumentError: no splat, axes that are none.
+    Raises BadArgumentError: no splat, or invalid axes.
     """
     if not clouds:
-        raise BadArgumentError("edit: expected a splat, or several that become one")
+        raise BadArgumentError("edit: expected a splat, or several to merge")
     for cloud in clouds:
         _check_is_cloud(cloud)
-    _core.check_edit("--mirror", "x", str(axes))  # says what is wrong with axes
+    _core.check_edit("--mirror", "x", str(axes))  # raises for invalid axes
     return Edit(clouds, axes)

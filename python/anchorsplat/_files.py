@@ -19,14 +19,14 @@ Order = Literal["format", "keep", "morton", "importance"]
 class Format(NamedTuple):
     """A splat format."""
 
-    name: str  #: "SPZ", for people
-    extensions: tuple[str, ...]  #: (".spz",); the first one is what functions here are told
+    name: str  #: such as "SPZ"
+    extensions: tuple[str, ...]  #: such as (".spz",); functions take the first
     is_read: bool
     is_written: bool
 
 
 def formats() -> list[Format]:
-    """Those that are read or written."""
+    """All formats that can be read or written."""
     return [Format(name, tuple(extensions), read, written) for name, extensions, read, written in _core.formats()]
 
 
@@ -41,20 +41,20 @@ def read(
     threads: int = 0,
     progress: ProgressLike = None,
 ) -> Cloud:
-    """Reads a splat of any known format, found by its content first and its extension second.
+    """Reads a splat of any known format, recognised by content, then by extension.
 
-    `source` is a path, the bytes of a file or a file that is open for reading bytes; a folder with a meta.json is a SOG.
-    `format` is an extension (".spz", "spz"), for those formats that have no mark of their own.
+    `source` is a path, the bytes of a file, or a file opened for reading bytes; a folder with a meta.json is a SOG.
+    `format` is an extension (".spz", "spz"), for formats that cannot be recognised by content.
 
-    Values that are not finite come through. Raises NotFoundError, IoError and BadFileError, which says the byte or line, the
-    property and what was expected; BadArgumentError: a format that is none.
+    Values that are not finite are kept. Raises NotFoundError, IoError; BadFileError, which names the byte or line, the
+    property and what was expected; BadArgumentError: an unknown format.
     """
     with run(threads, progress) as how:
         if isinstance(source, (str, os.PathLike)):
             return Cloud._of(_core.read_path(path_bytes(source), format or "", how))
         if hasattr(source, "read"):
             if format is None and str(getattr(source, "name", "")).lower().endswith(".splat"):
-                format = "splat"  # which has no mark of its own
+                format = "splat"  # cannot be recognised by content
             source = source.read()
         if not is_buffer(source):
             raise TypeError("read: expected a path, bytes or a file opened for bytes, found " + type(source).__name__)
@@ -72,25 +72,25 @@ def write(
     threads: int = 0,
     progress: ProgressLike = None,
 ) -> None:
-    """Writes a splat in the format of the extension of a path, or as `format` into a file that is open for bytes.
+    """Writes a splat to a path, in the format of its extension, or to a file opened for bytes, as `format`.
 
-    The file appears whole or not at all. What the format has no place for is a SplatWarning. `sort`: the order of the
-    Gaussians in the file, "format" as the format likes it; `spz_version`: 4, or 3 for programs that only know gzip.
+    A path appears whole or not at all. A SplatWarning names what the format cannot store. `sort`: order of the Gaussians in the
+    file; "format" is best for the format. `spz_version`: 4, or 3 for programs that only read gzip.
 
-    Raises ExistsError unless `overwrite`, NotFoundError (the folder), IoError; BadArgumentError: no Gaussians, an extension
-    that is not written.
+    Raises ExistsError unless `overwrite`, NotFoundError (the folder), IoError; BadArgumentError: no Gaussians, or an extension
+    that cannot be written.
     """
     words = words_of(write, locals(), besides=("format",))
     if isinstance(target, (str, os.PathLike)):
         if format is not None:
-            raise BadArgumentError("format: the extension of a path says it")
+            raise BadArgumentError("format: omit it for a path, whose extension gives the format")
         with run(threads, progress) as how:
             _core.write_path(path_bytes(target), cloud, words, overwrite, how)
         return
     if not hasattr(target, "write"):
         raise TypeError("write: expected a path or a file opened for bytes, found " + type(target).__name__)
     if format is None:
-        raise BadArgumentError("format: a file that is open has no extension; say which, such as format='spz'")
+        raise BadArgumentError("format: required for an open file, such as format='spz'")
     data: bytes = to_bytes(
         cloud, format, sort=sort, spz_version=spz_version, threads=threads, progress=progress
     )
@@ -98,14 +98,14 @@ def write(
 
 
 def _write_all(target: IO[bytes], data: bytes) -> None:
-    """A file without a buffer may take a part and say how much."""
+    """Unbuffered files may write only a part and return its size."""
     rest = memoryview(data)
     while rest:
         written = target.write(rest)
-        if written is None and not isinstance(target, io.RawIOBase):  # of a kind of file that does not say
+        if written is None and not isinstance(target, io.RawIOBase):  # a file that does not return it
             return
         if not written:
-            raise IoError(f"the file took only {len(data) - len(rest):,} of {len(data):,} bytes")
+            raise IoError(f"only {len(data) - len(rest):,} of {len(data):,} bytes were written")
         rest = rest[written:]
 
 
@@ -118,9 +118,9 @@ def to_bytes(
     threads: int = 0,
     progress: ProgressLike = None,
 ) -> bytes:
-    """The bytes of the file that ``write`` would make; `format` is its extension (".spz", "spz").
+    """The bytes of the file that ``write`` would write; `format` is its extension (".spz", "spz").
 
-    Raises BadArgumentError: no Gaussians, a format that is none, is not written, or of several files.
+    Raises BadArgumentError: no Gaussians, or a format that is unknown, cannot be written, or has several files.
     """
     words = words_of(to_bytes, locals())
     with run(threads, progress) as how:

@@ -1,4 +1,4 @@
-"""Splats as gsplat's trainer keeps them."""
+"""Parameters of gsplat's trainer."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def from_gsplat(params: Mapping[str, Any]) -> Cloud:
             wanted = "[N, 1, 3]" if name == "sh0" else "[N, K - 1, 3]"
             raise BadArgumentError(f"{name}: expected {wanted}, found {list(shape)}")
     if len(arrays["sh0"]) != len(arrays["shN"]):
-        raise BadArgumentError(f"shN: {len(arrays['shN'])} rows, and sh0 has {len(arrays['sh0'])}")
+        raise BadArgumentError(f"shN: {len(arrays['shN'])} rows, but sh0 has {len(arrays['sh0'])}")
     sh = np.concatenate([arrays["sh0"], arrays["shN"]], axis=1)
     return Cloud(arrays["means"], arrays["scales"], arrays["quats"], arrays["opacities"], sh)
 

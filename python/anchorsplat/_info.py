@@ -22,7 +22,7 @@ def info(
     Raises as ``read``.
     """
     if isinstance(source, (bytes, bytearray, memoryview)):
-        raise BadArgumentError("info: expected a path or a Cloud, found bytes: anchorsplat.info(anchorsplat.read(data))")
+        raise BadArgumentError("info: expected a path or a Cloud, found bytes; use anchorsplat.info(anchorsplat.read(data))")
     with run(threads, progress) as how:
         if isinstance(source, Cloud):
             return dict(json.loads(_core.info_cloud(source, how)))

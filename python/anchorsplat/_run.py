@@ -1,4 +1,4 @@
-"""How calls of the engine are run: threads, device, progress, messages."""
+"""Runs calls of the engine: threads, device, progress, messages."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _HERE = os.path.dirname(__file__) + os.sep
 
 
 class Progress(NamedTuple):
-    """How far a task of a call has come. The tasks of a call follow each other."""
+    """Progress of a task. The tasks of a call run one after the other."""
 
     task: str  #: "fit"
     done: int  #: steps
@@ -29,17 +29,17 @@ class Progress(NamedTuple):
     ended: bool
 
 
-#: ``True``: a bar by tqdm; a class such as ``tqdm.tqdm``, of which each task gets one, or one bar for all of them; a function
-#: that is called with a :class:`Progress`; ``None``, ``False``: nothing.
+#: ``True``: a tqdm bar. A class such as ``tqdm.tqdm``: one bar per task. A bar: the same one for all tasks. A function: called with
+#: a :class:`Progress`. ``None``, ``False``: nothing.
 ProgressLike = Union[None, bool, Callable[[Progress], object], Any]
 
-#: What rasterizes (docs/gpu.md): "cpu"; "gpu", the first that can be used; "auto", a real GPU where there is one, else the CPU; or
-#: the number of an adapter, as ``anchorsplat doctor`` lists them.
+#: Device that rasterizes (docs/gpu.md): "cpu"; "gpu", the first usable one; "auto", a hardware GPU, else the CPU; or the number of
+#: an adapter in ``anchorsplat doctor``.
 DeviceLike = Union[Literal["cpu", "gpu", "auto"], int]
 
 
 def warn(sentence: str) -> None:
-    """A warning at the line of the user's that called this package."""
+    """Warns at the line of the user's code that called this package."""
     level, frame = 1, sys._getframe(0)
     while frame is not None and frame.f_code.co_filename.startswith(_HERE):
         level, frame = level + 1, frame.f_back  # type: ignore[assignment]
@@ -47,7 +47,7 @@ def warn(sentence: str) -> None:
 
 
 class _Bars:
-    """Progress as a bar of tqdm's kind."""
+    """Shows progress in a tqdm-like bar."""
 
     def __init__(self, kind: Any) -> None:
         self._make = kind if isinstance(kind, type) else None
@@ -84,13 +84,13 @@ def shower(progress: ProgressLike) -> Callable[[Progress], object] | None:
         try:
             from tqdm.auto import tqdm
         except ImportError:
-            raise ImportError("progress=True shows bars by tqdm, which is not installed: pip install tqdm") from None
+            raise ImportError("progress=True needs tqdm: pip install tqdm") from None
         return _Bars(tqdm)
     if hasattr(progress, "update"):
         return _Bars(progress)
     if callable(progress):
         return progress
-    raise TypeError("progress: expected True, a bar of tqdm's kind or a function, found " + type(progress).__name__)
+    raise TypeError("progress: expected True, a tqdm bar or a function, found " + type(progress).__name__)
 
 
 @contextlib.contextmanager
@@ -102,7 +102,7 @@ def run(
     device: DeviceLike = "cpu",
     max_gpu_memory: int | str | None = None,
 ) -> Iterator[_core.RunArguments]:
-    """The arguments of one call of the engine. Messages go to the logger "anchorsplat", warnings to ``warnings``."""
+    """Arguments of one call of the engine. Messages go to the logger "anchorsplat", warnings to ``warnings``."""
     show = shower(progress)
     words = option_words("device", device)
     if max_gpu_memory is not None:

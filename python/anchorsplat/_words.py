@@ -1,4 +1,4 @@
-"""Keywords as the words of the command line: its declarations check them, so that both take the same and say the same."""
+"""Converts keywords to command-line words, so that the same declarations check them and the same messages appear."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from typing import Any, Callable
 
 from ._errors import BadArgumentError
 
-#: Keywords of every function that no word stands for.
+#: Keywords that are not passed as words.
 NO_WORDS = ("threads", "device", "max_gpu_memory", "seed", "progress", "overwrite")
 
 
 def path_bytes(path: str | os.PathLike[str]) -> bytes:
-    """As the system takes it. Raises BadArgumentError for a NUL, where it would end."""
+    """The path in the system's encoding. Raises BadArgumentError if it contains a NUL."""
     name = os.fsencode(path)
     if b"\0" in name:
-        raise BadArgumentError(f"{os.fsdecode(name)!r}: there is a NUL in this path")
+        raise BadArgumentError(f"{os.fsdecode(name)!r}: this path contains a NUL")
     return name
 
 
 def whole_number(name: str, value: Any) -> int:
-    """Raises TypeError for what is none."""
+    """Raises TypeError for anything else."""
     try:
         return operator.index(value)
     except TypeError:
@@ -30,7 +30,7 @@ def whole_number(name: str, value: Any) -> int:
 
 
 def natural(name: str, value: Any) -> int:
-    """Raises TypeError for what is no whole number, BadArgumentError for one below 0 or above 2⁶⁴ − 1."""
+    """Raises TypeError unless it is a whole number, BadArgumentError unless it is 0 to 2⁶⁴ − 1."""
     number = whole_number(name, value)
     if not 0 <= number < 1 << 64:
         raise BadArgumentError(f"{name}: must be 0 to 2^64 - 1, found {number}")
@@ -55,7 +55,7 @@ def option_words(name: str, value: Any) -> list[bytes]:
     option = os.fsencode("--" + name.replace("_", "-"))
     text = os.fsencode(text_of(name, value))
     if b"\0" in text:
-        raise BadArgumentError(f"{name}: there is a NUL in {value!r}")
+        raise BadArgumentError(f"{name}: {value!r} contains a NUL")
     return [option + b"=" + text] if text else [option, text]
 
 

@@ -1,4 +1,4 @@
-"""The rasterizer as a differentiable function of PyTorch's, on the CPU. Needs torch, which this package does not install."""
+"""The rasterizer as a differentiable PyTorch function, on the CPU. Needs torch, which this package does not install."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class _Rasterize(torch.autograd.Function):
         options: dict[str, Any],
         threads: int,
     ) -> tuple[torch.Tensor, torch.Tensor]:
-        # An optimizer changes parameters in place before the next step, autograd looks that it does not before backward.
+        # Lets autograd check that parameters are not changed in place before backward.
         ctx.save_for_backward(means, log_scales, quats, opacity_logits, sh)
         columns = [
             _array(name, tensor)
@@ -58,7 +58,7 @@ class _Rasterize(torch.autograd.Function):
     @staticmethod
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, colors: torch.Tensor, alphas: torch.Tensor) -> tuple[Any, ...]:
-        _ = ctx.saved_tensors  # raises where one was changed in place since
+        _ = ctx.saved_tensors  # raises if one was changed in place
         with run(ctx.threads) as how:
             *gradients, background = ctx.views.backward(_array("gradient", colors), _array("gradient", alphas), how)
         return (*(torch.from_numpy(g) for g in gradients), torch.tensor(background), None, None, None)
@@ -80,18 +80,18 @@ def rasterize(
     profile: Literal["gsplat14", "gsplat15"] = "gsplat14",
     threads: int = 0,
 ) -> tuple[torch.Tensor, torch.Tensor]:
-    """Draws N Gaussians through V cameras of one size; gradients flow to all six tensors.
+    """Renders N Gaussians through V cameras of one size, with gradients for all six tensors.
 
     means: [N,3] world units; log_scales: [N,3] ln(world units); quats: [N,4] wxyz, any norm; opacity_logits: [N];
-    sh: [N,(degree+1)²,3] coefficient-major. All stored values, before activation, float32 on the CPU.
-    background: [3] r, g, b; black otherwise.
-    mode: how it is rasterized, "classic", "antialiased" or "mip".
+    sh: [N,(degree+1)²,3] coefficient-major. All are values before activation, float32, on the CPU.
+    background: [3] r, g, b; default: black.
+    mode: rasterization, "classic", "antialiased" or "mip".
     sh_degree: highest degree in use.
-    near, far: world units in front of the camera, as gsplat's planes.
+    near, far: near and far plane, world units.
 
-    Returns colours [V,H,W,3], background included and not clamped above 1, and coverage [V,H,W,1]. The same bits for any
-    number of threads, forward and backward. Gradients are exact for what is calculated: cut-offs and the order of depths count
-    as constant. No second derivatives. Needs 8 bytes per pixel and Gaussian under it, per view, until backward is done.
+    Returns colours [V,H,W,3], including the background and not clamped above 1, and coverage [V,H,W,1]. The same bits for any
+    number of threads, forward and backward. Gradients treat cut-offs and the depth order as constant. No second derivatives.
+    Until backward is done, each view needs 8 bytes per pixel and Gaussian covering it.
 
     Raises BadArgumentError: another type, device or shape, cameras of different sizes.
     """
@@ -100,9 +100,9 @@ def rasterize(
     else:
         behind = torch.zeros(3) if background is None else torch.tensor([float(c) for c in background])
     if not isinstance(cameras, Cameras):
-        raise BadArgumentError(f"cameras: expected anchorsplat.Cameras (of a file: Cameras({cameras!r})), found {type(cameras).__name__}")
+        raise BadArgumentError(f"cameras: expected anchorsplat.Cameras (to read a file: Cameras({cameras!r})), found {type(cameras).__name__}")
     if profile not in ("gsplat14", "gsplat15"):
-        raise BadArgumentError(f"profile: {profile!r} is none of gsplat14, gsplat15")
+        raise BadArgumentError(f"profile: {profile!r} is not gsplat14 or gsplat15")
     if not 0 <= sh_degree <= 3:
         raise BadArgumentError(f"sh_degree: {sh_degree} is not 0 to 3")
     if isinstance(opacity_logits, torch.Tensor) and opacity_logits.dim() != 1:

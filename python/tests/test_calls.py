@@ -85,7 +85,7 @@ def test_progress_as_a_function_and_as_bars(cloud):
         anchorsplat.render(cloud, orbit=4, size=(16, 16), progress=3)
 
 
-@pytest.mark.filterwarnings("ignore:.*no place for where up is")
+@pytest.mark.filterwarnings("ignore:.*cannot store the up direction")
 def test_messages_go_to_logging_and_warnings(cloud, caplog):
     caplog.set_level(logging.INFO, "anchorsplat")
     anchorsplat.enhance(cloud, method="filter")

@@ -66,11 +66,11 @@ def test_own_arrays_are_borrowed_where_their_layout_allows():
     ("change", "message"),
     [
         ({"means": np.zeros((4, 2))}, r"means: expected an array \[N, 3\], found \[4, 2\]"),
-        ({"quats": np.zeros((5, 4))}, "quats: 5 rows, and means has 4"),
+        ({"quats": np.zeros((5, 4))}, "quats: 5 rows, but means has 4"),
         ({"sh": np.zeros((4, 5, 3))}, "sh: 5 coefficients"),
         ({"sh": np.zeros((4, 12))}, r"sh: expected an array \[N, N, 3\], found \[4, 12\]"),
         ({"log_scales": np.array(["a"])}, "log_scales: expected numbers"),
-        ({"render_mode": "bright"}, "render_mode: 'bright' is none of classic"),
+        ({"render_mode": "bright"}, "render_mode: 'bright' is not classic"),
     ],
 )
 def test_what_does_not_fit_is_said(change, message):

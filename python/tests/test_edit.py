@@ -94,7 +94,7 @@ def test_marks_and_modes_come_along(cloud):
     assert turned.comments[1] == "world up: 0 -1 0"
     classic = marked.copy()
     classic.render_mode = "classic"
-    with pytest.warns(anchorsplat.SplatWarning, match="different ways"):
+    with pytest.warns(anchorsplat.SplatWarning, match="different render modes"):
         assert marked.merge(classic).render_mode is None
 
 

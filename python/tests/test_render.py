@@ -82,7 +82,7 @@ def test_cameras_of_arrays_and_files(cloud, tmp_path):
     ("change", "message"),
     [
         ({"world_to_camera": np.zeros((2, 3))}, r"world_to_camera: expected an array \[V, 4, 4\], found \[1, 2, 3\]"),
-        ({"world_to_camera": 2 * np.eye(4)[None]}, "the upper 3 x 3 of camera 0 is no rotation"),
+        ({"world_to_camera": 2 * np.eye(4)[None]}, "the upper 3 x 3 of camera 0 is not a rotation"),
         ({"world_to_camera": np.full((1, 4, 4), np.nan)}, "not finite"),
         ({"intrinsics": np.eye(4)}, r"intrinsics: expected an array \[1, 3, 3\], found \[4, 4\]"),
         ({"width": 0}, "a picture of 0 x 4 pixels"),
@@ -120,7 +120,7 @@ def test_metrics(cloud):
         anchorsplat.psnr(a, b[:, 1:])
     with pytest.raises(anchorsplat.BadArgumentError, match="expected pictures"):
         anchorsplat.ssim(a[0, 0], b[0, 0])
-    with pytest.raises(anchorsplat.BadArgumentError, match="give uint8, or floats"):
+    with pytest.raises(anchorsplat.BadArgumentError, match="pass uint8, or floats"):
         anchorsplat.psnr(bytes_of_a.astype(np.uint16), a)
     assert anchorsplat.sheet({"a": a[0], "b": b[0]}).shape[2] == 3
 
@@ -139,7 +139,7 @@ def test_comparisons(cloud, tmp_path):
     assert files["mean"]["psnr"] == pytest.approx(one["mean"]["psnr"], abs=0.2)
     with pytest.raises(anchorsplat.BadArgumentError, match="needs views: pass --cameras FILE or --orbit N"):
         anchorsplat.compare(worse, cloud)
-    with pytest.raises(anchorsplat.BadArgumentError, match="4 pictures and 2 views"):
+    with pytest.raises(anchorsplat.BadArgumentError, match="4 pictures, but 2 views"):
         anchorsplat.compare(worse, pictures, cameras=cameras[:2])
     with pytest.raises(anchorsplat.BadArgumentError, match="--orbit has no effect on pictures"):
         anchorsplat.compare(pictures, pictures, orbit=3)

@@ -123,7 +123,7 @@ def test_what_cannot_be_differentiated_is_refused(few, cameras):
         rasterize(*values, cameras, background=[1, 2])
     for because, how in {
         "background: not finite": {"background": [0, float("nan"), 1]},
-        "profile: 'foo' is none of": {"profile": "foo"},
+        "profile: 'foo' is not": {"profile": "foo"},
         "sh_degree: 9 is not 0 to 3": {"sh_degree": 9},
     }.items():
         with pytest.raises(anchorsplat.BadArgumentError, match=because):

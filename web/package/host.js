@@ -73,7 +73,7 @@ function call(request, data) {
   if (from === 0 || at === 0) {
     if (from !== 0) engine._anchorsplat_free(from);
     if (at !== 0) engine._anchorsplat_free(at);
-    const message = 'there is not enough memory for this splat';
+    const message = 'not enough memory for this splat';
     return {answer: {error: {code: 'io', message}, messages: []}, blocks: []};
   }
   const length = address(engine._anchorsplat_call(from, words.length, at, lengthOf(data)));

@@ -145,7 +145,7 @@ function preview() {
   viewer.contentWindow.postMessage({widening: gain * (pixelSize() ?? 0) ** 2}, '*');
 }
 
-// What the engine says as the command line does, in words of this page, a sentence each.
+// Rewords a message of the command line for this page, as a sentence.
 function sentence(text) {
   const here = text.replace(/Pass --cameras or --pixel-size(, or --mode \w+ to enhance it anyway)?/, 'Use the slider or training cameras')
     .replace(/\. --(filter-strength F|mode \w+) enhances it anyway/, '').replace(/, or pass --mode to trust them$/, '')
@@ -167,7 +167,7 @@ function pixelSize() {
 
 function tellPixelSize() {
   const size = pixelSize();
-  const source = chosen ? '' : ' (read from the splat)';
+  const source = chosen ? '' : ' (estimated)';
   byId('pixel-value').textContent = size === null ? 'not known' : `${size.toPrecision(3)}${source}`;
   if (cameras) {
     byId('cameras-about').textContent = `${number(cameras.count)} cameras: ` + (chosen

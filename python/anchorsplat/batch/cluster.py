@@ -1,4 +1,4 @@
-"""Ray: of its own on this machine, by default, or one that runs already."""
+"""Connects to Ray: by default its own on this machine, or a running cluster."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from typing import Any
 from .._cluster_address import look_for
 from .._errors import BadArgumentError, IoError, NotFoundError
 
-_OBJECT_STORE = 80 << 20  # bytes: results of tasks are rows; Ray takes no less
+_OBJECT_STORE = 80 << 20  # bytes, Ray's minimum: results of tasks are only rows
 _PRIVATE = {
-    # Every process listens on 127.0.0.1 and nowhere else. (The variable is named after where that is Ray's default.)
+    # Every process listens on 127.0.0.1 only. (The variable is named after the systems where that is Ray's default.)
     "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",
     "RAY_USAGE_STATS_ENABLED": "0",
-    # Workers are as nice as this process, not 15 more, which on a busy machine makes them several times as slow.
+    # Workers keep this process's niceness. Ray adds 15, which makes them several times slower on a busy machine.
     "RAY_worker_niceness": "0",
 }
 
 
-# One for the whole process, as older Rays keep what they were told first.
+# One for the whole process, as older versions of Ray keep the first token.
 _TOKEN = {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": secrets.token_hex(32)}
 _PREFIX = "anchorsplat-ray-"
 
@@ -35,7 +35,7 @@ def ray_module() -> Any:
     try:
         import ray
     except ImportError as error:
-        raise NotFoundError("batches run on Ray, which is not installed: pip install 'anchorsplat[batch]'") from error
+        raise NotFoundError("batches need Ray: run pip install 'anchorsplat[batch]'") from error
     return ray
 
 
@@ -45,8 +45,8 @@ def cores() -> int:
 
 @contextlib.contextmanager
 def _token_read_again() -> Iterator[None]:
-    """Ray's core keeps the token that it was given first: the user's of an earlier Ray in this process, or ours. Where the
-    user has switched tokens off in this process, ours cannot be on."""
+    """Ray's core keeps its first token in a process: the user's from an earlier Ray, or ours. If the user has disabled tokens in
+    this process, ours cannot be enabled."""
 
     def forget() -> None:
         with contextlib.suppress(AttributeError):
@@ -65,15 +65,15 @@ def _token_read_again() -> Iterator[None]:
 
 @contextlib.contextmanager
 def connected(address: str | None, cpus: int | None) -> Iterator[Any]:
-    """Ray, connected. One that is connected already is used and stays; what is begun here ends here.
+    """Connects Ray. An existing connection is used and kept; one started here is shut down here.
 
     `address`: of a cluster ("auto", "HOST:PORT"); None: a Ray on this machine, for as long as this lasts, that listens
     on 127.0.0.1 only and asks for a token that only this process knows.
     """
     if address is not None and "://" in address:
         raise BadArgumentError(
-            f"--ray {address}: give HOST:PORT of the cluster's head, or auto, on a machine of the cluster, "
-            "or hand the whole command to `ray job submit`"
+            f"--ray {address}: pass HOST:PORT of the cluster's head, or auto, on a machine of the cluster, "
+            "or run the whole command with `ray job submit`"
         )
     if address is None and "ray" in sys.modules and sys.modules["ray"].is_initialized():
         yield sys.modules["ray"]
@@ -93,9 +93,9 @@ def connected(address: str | None, cpus: int | None) -> Iterator[Any]:
         return
     with _environment({**_PRIVATE, **_TOKEN}), _token_read_again():
         ray = ray_module()
-        with contextlib.suppress(AttributeError):  # read when Ray was imported, which may have been earlier
+        with contextlib.suppress(AttributeError):  # read when Ray was imported, maybe earlier
             ray._private.ray_constants.ENABLE_RAY_CLUSTER = False
-        # Unix sockets, whose paths have 107 bytes at most, are in there.
+        # Contains Unix sockets, whose paths may have at most 107 bytes.
         place = Path("/tmp" if len(tempfile.gettempdir()) > 30 else tempfile.gettempdir())
         _sweep(place)
         folder = tempfile.mkdtemp(prefix=f"{_PREFIX}{os.getpid()}-", dir=place)
@@ -117,7 +117,7 @@ def connected(address: str | None, cpus: int | None) -> Iterator[Any]:
 
 
 def _sweep(place: Path) -> None:
-    """Takes away what a process of ours left that was killed (-9)."""
+    """Removes what killed (-9) processes of ours left."""
     for folder in place.glob(_PREFIX + "*"):
         owner = folder.name.removeprefix(_PREFIX).partition("-")[0]
         try:
@@ -129,7 +129,7 @@ def _sweep(place: Path) -> None:
 
 @contextlib.contextmanager
 def _environment(values: dict[str, str]) -> Iterator[None]:
-    """Ray's processes and its C++ core read these when they start."""
+    """Environment variables that Ray's processes and its C++ core read on start."""
     before = {name: os.environ.get(name) for name in values}
     os.environ.update(values)
     try:
@@ -143,7 +143,7 @@ def _environment(values: dict[str, str]) -> Iterator[None]:
 
 
 def memory_of_largest_machine(ray: Any) -> int:
-    """Bytes that Ray may give to tasks there."""
+    """Most memory, in bytes, that a machine of the cluster gives to tasks."""
     return int(max((node["Resources"].get("memory", 0) for node in ray.nodes() if node["Alive"]), default=0))
 
 
@@ -152,7 +152,7 @@ def cpus_of_largest_machine(ray: Any) -> int:
 
 
 def slots(ray: Any, cpus_per_task: int) -> int:
-    """How many tasks can run at a time, as the cluster is now."""
+    """Number of tasks that the cluster can run at a time now."""
     return sum(
         int(node["Resources"].get("CPU", 0)) // cpus_per_task for node in ray.nodes() if node["Alive"]
     )

@@ -1,4 +1,4 @@
-"""`anchorsplat batch VERB`: the batch's own options, and those of the verb itself, which its --help declares."""
+"""`anchorsplat batch VERB`: options of batches, and those of the verb itself."""
 
 from __future__ import annotations
 
@@ -18,33 +18,33 @@ from .report import BatchReport
 from .settings import OWN
 
 _VERBS = {
-    "enhance": "splats, by the options of `anchorsplat enhance`",
-    "refine": "the same by --method refine: minutes for each, goes on after Ctrl-C",
-    "dataset": "a data set, object by object, by the options of `anchorsplat dataset build`",
-    "eval": "methods on a benchmark, by the options of `anchorsplat eval`",
+    "enhance": "splats, with the options of `anchorsplat enhance`",
+    "refine": "the same with --method refine: minutes per splat, resumes after Ctrl-C",
+    "dataset": "a data set, object by object, with the options of `anchorsplat dataset build`",
+    "eval": "methods on a benchmark, with the options of `anchorsplat eval`",
 }
 _OWN_OF_FOLDERS = {"--output", "--json", "--quiet", "--overwrite", "--threads", "--plan"}
 _OWN_OF_DATASET = _OWN_OF_FOLDERS | {"--jobs", "--retry", "--timeout"}
 
 
 def main(argv: Sequence[str]) -> int:
-    """Runs `anchorsplat batch ARGV`; its exit code (docs/cli.md)."""
+    """Runs `anchorsplat batch ARGV`. Returns the exit code (docs/cli.md)."""
     words = list(argv)
     if not words or words[0] in ("-h", "--help"):
         _usage()
         return 0 if words else 2
     verb = words[0]
     if verb not in _VERBS:
-        print(f"error: batch {printable(verb)}: is none of {', '.join(_VERBS)}", file=sys.stderr)
+        print(f"error: batch has no verb '{printable(verb)}'; known: {', '.join(_VERBS)}", file=sys.stderr)
         return 2
     asked: argparse.Namespace | None = None
     try:
         asked = _parser(verb).parse_intermixed_args(words[1:])
         return {"enhance": _splats, "refine": _splats, "dataset": _dataset, "eval": _eval}[verb](verb, asked)
-    except SystemExit as ended:  # argparse has said why
+    except SystemExit as ended:  # argparse has printed the reason
         return int(ended.code or 0)
     except KeyboardInterrupt:
-        return _complain(asked, INTERRUPTED, "interrupted", "interrupted; the same command goes on from here")
+        return _complain(asked, INTERRUPTED, "interrupted", "interrupted; run the same command to continue")
     except Error as error:
         code = next((number for number, (_, kind) in CODES.items() if isinstance(error, kind)), 6)
         return _complain(asked, code, CODES[code][0], str(error))
@@ -60,7 +60,7 @@ def _complain(asked: argparse.Namespace | None, code: int, name: str, message: s
 
 
 def _usage() -> None:
-    print("Many splats on many cores and machines, by Ray (docs/batch.md)\n")
+    print("Many splats on many cores and machines, with Ray (docs/batch.md)\n")
     print("Usage: anchorsplat batch VERB ...\n")
     for verb, what in _VERBS.items():
         print(f"  {verb:<9} {what}")
@@ -69,7 +69,7 @@ def _usage() -> None:
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        """Two lines, as the program itself says it; not all of the options."""
+        """Prints two lines, as the program does, without all options."""
         print(f"error: {printable(message)}\nTry: {self.prog} --help", file=sys.stderr)
         raise SystemExit(2)
 
@@ -81,26 +81,26 @@ def _parser(verb: str) -> argparse.ArgumentParser:
         add("inputs", nargs="*", metavar="IN", help="paths, URLs (s3://, gs://, http://) or patterns of them; ** is any folders")
         add("--out", "-o", required=True, metavar="DIR", help="folder or URL of the results")
         add("--list", action="append", default=[], metavar="FILE", help="text file of inputs, one a line")
-        add("--root", metavar="DIR", help="results keep their folders below this one (default: those of the pattern's wild part)")
-        add("--format", choices=FORMATS, help="of the results (default: that of each input where it can be written, else ply)")
-        add("--manifest", metavar="FILE", help="what became of each input (default: manifest.jsonl in DIR)")
+        add("--root", metavar="DIR", help="results keep the input folders below this one (default: those from the first wildcard on)")
+        add("--format", choices=FORMATS, help="format of the results (default: that of each input if it can be written, else ply)")
+        add("--manifest", metavar="FILE", help="list of what was done with each input (default: manifest.jsonl in DIR)")
         add("--verify", action="store_true", help="also read inputs and results that look unchanged")
     elif verb == "dataset":
-        add("meshes", nargs="*", metavar="MESH", help="as of dataset build")
-        add("--out", "-o", required=True, metavar="DIR", help="folder of the data set, that all machines share")
+        add("meshes", nargs="*", metavar="MESH", help="meshes, as for dataset build")
+        add("--out", "-o", required=True, metavar="DIR", help="folder of the data set, shared by all machines")
         add("--retry", action="store_true", help="try again what failed in an earlier run")
-        add("--timeout", type=float, default=14400, metavar="SECONDS", help="that an object may take; 0: any (default: 14400)")
+        add("--timeout", type=float, default=14400, metavar="SECONDS", help="time limit of an object; 0: none (default: 14400)")
     else:
-        add("benchmark", metavar="BENCHMARK", help="folder with a folder per object, that all machines share")
-        add("--out", "-o", required=True, metavar="DIR", help="folder of tables and results, that all machines share")
+        add("benchmark", metavar="BENCHMARK", help="folder with a folder per object, shared by all machines")
+        add("--out", "-o", required=True, metavar="DIR", help="folder of tables and results, shared by all machines")
     if verb in ("dataset", "eval"):
-        add("--memory", type=float, default=2, metavar="GB", help="that a task is likely to take (default: 2)")
-    add("--ray", metavar="ADDRESS", help="HOST:PORT of a cluster's head, or auto (default: a Ray of this machine alone)")
-    add("--workers", type=int, metavar="N", help="tasks at a time on this machine (default: as many as it has cores for)")
+        add("--memory", type=float, default=2, metavar="GB", help="expected memory of a task (default: 2)")
+    add("--ray", metavar="ADDRESS", help="HOST:PORT of a cluster's head, or auto (default: Ray on this machine only)")
+    add("--workers", type=int, metavar="N", help="tasks at a time on this machine (default: as many as its cores allow)")
     add("--threads", type=int, default=1, metavar="N", help="cores of one task (default: 1)")
-    add("--in-flight", type=int, metavar="N", help="tasks that Ray knows of at a time (default: twice as many as can run)")
-    add("--retries", type=int, default=3, metavar="N", help="of a task whose worker or program was killed or whose storage failed (default: 3)")
-    add("-w", "--overwrite", action="store_true", help="make all again")
+    add("--in-flight", type=int, metavar="N", help="tasks submitted to Ray at a time (default: twice as many as can run)")
+    add("--retries", type=int, default=3, metavar="N", help="retries of a task whose worker or program was killed, or whose storage failed (default: 3)")
+    add("-w", "--overwrite", action="store_true", help="redo everything")
     add("-q", "--quiet", action="store_true", help="only errors on stderr, no summary")
     add("--json", action="store_true", help="the result as one JSON document on stdout")
     native = _native_verb(verb)
@@ -128,7 +128,7 @@ def _own(verb: str) -> set[str]:
 
 
 def _passed(asked: argparse.Namespace) -> dict[str, Any]:
-    """Of the verb's own options, those that were given."""
+    """Given options of the verb itself."""
     given = {}
     for name, value in vars(asked).items():
         if name.startswith("passed ") and value:

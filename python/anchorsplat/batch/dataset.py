@@ -19,8 +19,8 @@ _DONE_WITH = (".job", ".log", ".lock")
 
 def build(meshes: Sequence[str], out: str, options: Sequence[str], how: How, *, overwrite: bool = False,
           retry: bool = False, timeout: float = 14400, memory: int = 2 << 30) -> BatchReport:  # fmt: skip
-    """The data set's own manifest.jsonl and failures.jsonl say what became of each object. Raises Stopped when interrupted;
-    the same command goes on."""
+    """Results are in the data set's manifest.jsonl and failures.jsonl. Raises Stopped when interrupted; the same command
+    continues."""
     begin = time.monotonic()
     how.check()
     target = shared_folder(out)
@@ -50,7 +50,7 @@ def build(meshes: Sequence[str], out: str, options: Sequence[str], how: How, *, 
                     derived = [o for o in wanted if o["base"]]
                     for o in derived:
                         if o["base"] in missing:
-                            _add_failure(target, o, f"is made from {o['base']}, which is not there", stage="base")
+                            _add_failure(target, o, f"is made from {o['base']}, which is missing", stage="base")
                             failures.append({"output": o["name"], "input": o["source"], "error": {"code": "not_found"}})
                     yield [_job(o, shared, how, timeout) for o in derived if o["base"] not in missing]
 
@@ -73,7 +73,7 @@ def _job(wanted: dict[str, str], shared: SharedFolder, how: How, timeout: float)
 
 
 def _add_failure(dataset: str, wanted: dict[str, str], message: str, stage: str = "") -> None:
-    """A line of failures.jsonl, which `dataset build` keeps."""
+    """Adds a line to failures.jsonl of `dataset build`."""
     if not stage:
         try:
             stage = Path(_building(dataset, wanted["name"]), "stage").read_text()[:100]

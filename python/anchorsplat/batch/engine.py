@@ -1,4 +1,4 @@
-"""The native program as batches run it: a process per splat, so that no file can take a worker down with it."""
+"""Runs the native program for batches, in a process per splat, so that a bad file cannot crash a worker."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from typing import Any
 
 from .._errors import BadArgumentError, BadFileError, Error, ExistsError, IoError, NotFoundError
 
-#: What the program's exit codes mean (docs/cli.md): the name in rows, and the exception of this package.
+#: Exit codes of the program (docs/cli.md): name in rows, exception of this package.
 CODES = {
     2: ("bad_argument", BadArgumentError),
     3: ("not_found", NotFoundError),
@@ -29,26 +29,26 @@ CODES = {
 }
 INTERRUPTED = 130
 
-_WAIT_TO_STOP = 30.0  # seconds: a refinement writes its checkpoint first
-_LOOK_UP = 0.25  # seconds: Ray's cancellation is seen by Python code only, not by a system call that waits
-_KEPT_MESSAGES = 16_000  # characters of stderr that a row may hold
+_WAIT_TO_STOP = 30.0  # seconds; a refinement first writes its checkpoint
+_LOOK_UP = 0.25  # seconds; a blocking system call would not notice Ray's cancellation
+_KEPT_MESSAGES = 16_000  # most characters of stderr in a row
 _PR_SET_PDEATHSIG = 1
 _libc = ctypes.CDLL(None, use_errno=True)
 
 
 def program() -> Path:
-    """The native program that came with this package; ANCHORSPLAT_PROGRAM names another."""
+    """Path of the native program of this package, or of ANCHORSPLAT_PROGRAM."""
     named = os.environ.get("ANCHORSPLAT_PROGRAM")
     path = Path(named) if named else Path(os.path.abspath(__file__)).parent.parent / "_bin" / "anchorsplat"
     if not os.access(path, os.X_OK):
         why = "ANCHORSPLAT_PROGRAM names it" if named else "install the package again"
-        raise NotFoundError(f"{path}: the program of this package is not there; {why}")
+        raise NotFoundError(f"{path}: the program of this package is missing; {why}")
     return path
 
 
 @dataclass(frozen=True)
 class Engine:
-    """Which program makes the results: its version, and the hash of its bytes, which hold the built-in network, too."""
+    """Identity of the program: version and hash of its bytes, which include the built-in network."""
 
     version: str
     digest: str
@@ -64,7 +64,7 @@ def engine() -> Engine:
 
 @dataclass(frozen=True)
 class Ended:
-    """How a process of the program ended. `signal` is what killed it; `document` is its --json, None where it has none."""
+    """How a process of the program ended. `signal` killed it; `document` is its --json output, or None."""
 
     code: int
     signal: int
@@ -73,7 +73,7 @@ class Ended:
     messages: list[str]
 
     def error(self) -> dict[str, str]:
-        """Code and message for a row."""
+        """Error code and message for a row."""
         if self.signal:
             said = "; it said: " + " / ".join(self.messages[-3:]) if self.messages else ""
             name = signal.strsignal(self.signal)
@@ -96,7 +96,7 @@ class Ended:
 
 @functools.cache
 def _dying_with_parent() -> list[str]:
-    """Words before a command. What is started by these needs no fork of this process, which takes 9 ms in one of Ray's."""
+    """Prefix for commands that avoids a fork of this process, which takes 9 ms in a Ray worker."""
     helper = shutil.which("setpriv")  # of util-linux
     return [helper, "--pdeathsig", "KILL", "--"] if helper else []
 
@@ -108,7 +108,7 @@ def _die_with_parent(parent: int) -> None:
 
 
 def run(arguments: list[str], *, memory_limit: int = 0, timeout: float = 0, log: Path | None = None) -> Ended:
-    """Runs the program. It dies with this process, however that ends; KeyboardInterrupt stops it in good order first.
+    """Runs the program. It ends with this process, however that ends; on KeyboardInterrupt it first stops cleanly.
 
     `memory_limit`: bytes that it may allocate, 0: any. `timeout`: seconds, 0: any. `log`: takes its stdout and stderr.
     """
@@ -155,11 +155,11 @@ def _stop(process: subprocess.Popen[bytes]) -> None:
 
 @dataclass(frozen=True)
 class Option:
-    """An option of a verb, as the program declares it."""
+    """An option of a verb, as declared by the program."""
 
     name: str  # "--pixel-size"
     short: str  # "-w" or ""
-    kind: str  # "TEXT", "INT", "FLOAT"; "": a flag
+    kind: str  # "FILE", "INT", "FLOAT"; "": a flag
     several: bool  # takes more than one value
 
 
@@ -170,7 +170,7 @@ def _verbs() -> dict[str, Any]:
 
 @functools.cache
 def options(*verb: str) -> dict[str, Option]:
-    """What `anchorsplat VERB` takes, from `anchorsplat manual json`. An option is there by each of its long names."""
+    """Options of `anchorsplat VERB` from `anchorsplat manual json`, by each of their long names."""
     declared = _verbs()[verb[0]]
     for word in verb[1:]:
         declared = declared["verbs"][word]

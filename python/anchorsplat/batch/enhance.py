@@ -1,4 +1,4 @@
-"""`anchorsplat batch enhance` and `batch refine`: the driver's side."""
+"""`anchorsplat batch enhance` and `batch refine`, in the driver."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from .scheduler import Stopped, run_tasks, signals_interrupt
 from .settings import Settings, files_of, settings_of
 from .task import SplatJob, enhance_one, failed
 
-STATE_FOLDER = ".batch"  # below the folder of results: what is there only while a batch works
+STATE_FOLDER = ".batch"  # in the folder of results, while a batch runs
 _CLAIMED_AHEAD = 500  # names per line of the manifest
 _SHOWN_FAILURES = 20
 
 
 @dataclasses.dataclass(frozen=True)
 class How:
-    """How a batch runs, whatever it makes."""
+    """Settings of a batch, whatever it makes."""
 
     ray: str | None = None
     workers: int | None = None
@@ -44,9 +44,9 @@ class How:
         for name, value, least in (("workers", self.workers, 1), ("threads", self.threads, 1),
                                    ("in-flight", self.in_flight, 1), ("retries", self.retries, 0)):  # fmt: skip
             if value is not None and value < least:
-                raise BadArgumentError(f"--{name} {value}: at least {least}")
+                raise BadArgumentError(f"--{name} {value}: must be at least {least}")
         if self.ray is not None and self.workers is not None:
-            raise BadArgumentError("--workers is of the Ray of this machine; with --ray the cluster says how many there are")
+            raise BadArgumentError("--workers has no effect with --ray, where the cluster sets the number of workers")
 
     @property
     def cpus(self) -> int:
@@ -54,7 +54,7 @@ class How:
 
 
 class SplatBatch:
-    """One run over many splats: what is to be done, what became of it, and the manifest of both."""
+    """One run over many splats: jobs, their results and the manifest."""
 
     def __init__(self, target: str, manifest: str | None, settings: Settings, how: How) -> None:
         self.target = storage.absolute(target)
@@ -71,18 +71,18 @@ class SplatBatch:
         self.progress = Progress("batch", self.counts, quiet=how.quiet, show=how.show)
 
     def plan(self, inputs: Sequence[Input], *, overwrite: bool, verify: bool) -> list[SplatJob]:
-        """Jobs for what is missing or has changed. Errors: ExistsError: results would replace files of others."""
+        """Jobs for missing or changed results. Raises ExistsError if results would replace files that no batch made."""
         self.counts.total = len(inputs)
         sizes = storage.sizes_below(self.target, [item.name for item in inputs])
         foreign = [i.name for i in inputs if i.name in sizes and i.name not in self.manifest.known and not overwrite]
         if foreign:
             more = f" and {len(foreign) - 1:,} more" if len(foreign) > 1 else ""
             where = storage.join(self.target, foreign[0])
-            raise ExistsError(f"{where}{more}: there already, and not made by a batch with this manifest; -w replaces")
+            raise ExistsError(f"{where}{more}: exists, but was not made by a batch with this manifest; -w replaces")
         jobs = []
         for item in inputs:
             if self.local and storage.join(self.target, item.name) == item.uri:
-                raise BadArgumentError(f"{item.uri}: its result would replace it; give another --out or --format")
+                raise BadArgumentError(f"{item.uri}: its result would replace it; pass another --out or --format")
             if not item.there:
                 self._fail(item, {"code": "not_found", "message": f"{item.uri}: no such file"})
                 continue
@@ -148,7 +148,7 @@ class SplatBatch:
             return self.how.in_flight or 2 * max(1, cluster.slots(ray, self.how.threads))
 
         if self.local:
-            shutil.rmtree(self._state("work"), ignore_errors=True)  # of a batch that was killed
+            shutil.rmtree(self._state("work"), ignore_errors=True)  # left by a killed batch
         try:
             run_tasks(ray, self._claimed(jobs), submit, self._ended, in_flight)
         finally:
@@ -234,7 +234,7 @@ def run_splats(
     verify: bool = False,
     stopped: Callable[[BatchReport], None] | None = None,
 ) -> BatchReport:
-    """All of a batch. `stopped` gets the report of one that was interrupted, which is raised then."""
+    """Runs a whole batch. After an interruption, passes the report to `stopped` and raises."""
     begin = time.monotonic()
     how.check()
     inputs = expand(words, lists, root=root, format=format)

@@ -1,4 +1,4 @@
-"""What a batch is asked to do: addresses, patterns and lists become inputs, and inputs get the names of their results."""
+"""Expands addresses, patterns and lists to inputs, and names their results."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from .._errors import BadArgumentError, NotFoundError
 from . import storage
 
-#: Formats of results: one file each, that `enhance` writes.
+#: Formats of results: those of `enhance` with a single file.
 FORMATS = ("ply", "compressed.ply", "spz", "sog", "splat", "glb")
 
 _WILD = re.compile(r"[*?\[]")
@@ -23,12 +23,12 @@ class Input:
     uri: str
     name: str  # of the result, below the batch's folder
     size: int | None = None  # bytes
-    identity: str = ""  # changes with the content; "": nothing tells
+    identity: str = ""  # changes with the content; "": unknown
     there: bool = True
 
 
 def expand(words: Iterable[str], lists: Iterable[str] = (), *, root: str | None = None, format: str | None = None) -> list[Input]:
-    """The inputs in the order of their names' first mention, each once.
+    """The inputs, each once, in order of first mention.
 
     A word is a path, a URL or a pattern of either (`*`, `?`, `[a-z]`, `**`); a list is a text file of words, one a line,
     `#` begins a comment. The result of `ROOT/a/b.ply` is called `a/b.ply`; ROOT is `root`, else what stands before a
@@ -39,7 +39,7 @@ def expand(words: Iterable[str], lists: Iterable[str] = (), *, root: str | None 
     NotFoundError: a list that is not there, a pattern that nothing matches. An input that is not there is no error.
     """
     if format is not None and format not in FORMATS:
-        raise BadArgumentError(f"--format {format}: is none of {', '.join(FORMATS)}")
+        raise BadArgumentError(f"--format {format}: must be one of {', '.join(FORMATS)}")
     wanted = list(words)
     for source in lists:
         for line in storage.read_text(storage.absolute(source)).splitlines():
@@ -47,9 +47,9 @@ def expand(words: Iterable[str], lists: Iterable[str] = (), *, root: str | None 
             if line and not line.startswith("#"):
                 wanted.append(line)
     if not wanted:
-        raise BadArgumentError("no inputs: give paths, patterns, URLs, or --list FILE")
+        raise BadArgumentError("no inputs: pass paths, patterns, URLs, or --list FILE")
 
-    found: dict[str, tuple[str, dict[str, Any] | None]] = {}  # address: root, what its file system says
+    found: dict[str, tuple[str, dict[str, Any] | None]] = {}  # address: root, info from its file system
     plain: dict[str, str] = {}
     for word in wanted:
         literal = storage.is_local(word) and storage.stat(storage.absolute(word)) is not None
@@ -70,7 +70,7 @@ def expand(words: Iterable[str], lists: Iterable[str] = (), *, root: str | None 
     base = storage.absolute(root) if root else None
     for uri, (own_root, info) in found.items():
         if info is None and storage.is_local(uri) and storage.open_place(uri)[0].isdir(uri):
-            raise BadArgumentError(f"{uri}: is a folder; give the files in it: '{uri}/*.ply', or '{uri}/**/*.ply'")
+            raise BadArgumentError(f"{uri}: is a folder; pass the files in it: '{uri}/*.ply', or '{uri}/**/*.ply'")
         name = _name(uri, base or own_root, format)
         size = info.get("size") if info else None
         inputs.append(Input(uri, name, size, storage.identity(info) if info else "", info is not None))
@@ -79,7 +79,7 @@ def expand(words: Iterable[str], lists: Iterable[str] = (), *, root: str | None 
 
 
 def _wild(word: str) -> bool:
-    """In URLs of the web, what follows a ? is a query."""
+    """In web URLs, ? starts a query."""
     return bool(_WILD.search(word.partition("?")[0] if word.startswith(("http://", "https://")) else word))
 
 
@@ -109,14 +109,14 @@ def _name(uri: str, root: str, format: str | None) -> str:
         raise BadArgumentError(f"{uri}: is not below --root {root}")
     name = uri[len(prefix) :].partition("?")[0]
     if not name or any(part in ("", ".", "..") for part in name.split("/")) or "\0" in name:
-        raise BadArgumentError(f"{uri}: no name for a result follows from that; call the file otherwise")
+        raise BadArgumentError(f"{uri}: no valid name for the result follows from it; rename the file")
     found = _SUFFIX.search(name)
     suffix = found[1] if found else ""
     stem = name[: len(name) - len(suffix)]
     if format is None:
         format = suffix[1:].lower() if suffix[1:].lower() in FORMATS else "ply"
     if not stem.rpartition("/")[2]:
-        raise BadArgumentError(f"{uri}: no name for a result follows from that; call the file otherwise")
+        raise BadArgumentError(f"{uri}: no valid name for the result follows from it; rename the file")
     return f"{stem}.{format}"
 
 
@@ -127,5 +127,5 @@ def _refuse_same_names(inputs: list[Input]) -> None:
         if other != item.uri:
             raise BadArgumentError(
                 f"{other} and {item.uri} would both become {item.name}; --root FOLDER keeps the folders below it, "
-                "or make two batches"
+                "or run two batches"
             )

@@ -1,4 +1,4 @@
-"""The manifest: a line of JSON for everything that happened to a result. Only the process that runs the batch writes it.
+"""The manifest: a line of JSON per event of a result. Only the process that runs the batch writes it.
 
 Lines, in the order of time; the last one about a name counts:
 
@@ -26,14 +26,14 @@ from typing import Any, NamedTuple
 from .._errors import BadFileError, ExistsError, IoError
 from . import storage
 
-_SYNC_EVERY = 1.0  # seconds between fsyncs: a power cut costs that much, a kill nothing
+_SYNC_EVERY = 1.0  # seconds between fsyncs: at most this is lost in a power cut, nothing in a kill
 _SEGMENT_EVERY = 5.0  # seconds between segments on object stores
 _SEGMENT_BYTES = 1 << 20
 _MANY_SEGMENTS = 32
 
 
 class Known(NamedTuple):
-    """What the manifest remembers of a name between runs. Small: there may be a million."""
+    """What the manifest keeps per name between runs. Small, as there may be a million."""
 
     state: str  # "claimed", "done", "failed"
     fingerprint: str = ""
@@ -61,7 +61,7 @@ def _line(value: dict[str, Any]) -> str:
 
 
 class Manifest:
-    """Opened, it holds what is known; claim() and record() add to it and to the file.
+    """After opening it holds the known rows; claim() and record() add to it and to the file.
 
     Errors: BadFileError: a line that is none of a manifest's; ExistsError: another batch works with it; IoError.
     """
@@ -95,16 +95,16 @@ class Manifest:
             else:
                 self.known[str(line["output"])] = _known(line)
         except (ValueError, TypeError, KeyError) as error:
-            raise BadFileError(f"{where}: is no line of a batch's manifest; give another --manifest or --out") from error
+            raise BadFileError(f"{where}: is not a line of a batch manifest; pass another --manifest or --out") from error
 
     def _compact(self) -> None:
-        """Only what counts about each name."""
+        """The relevant state of each name."""
         claimed = [name for name, known in self.known.items() if known.state == "claimed"]
         head = [_line({"claim": claimed})] if claimed else []
         self._journal.replace([*head, *map(_line, self.rows().values())])
 
     def claim(self, names: list[str]) -> None:
-        """Before work on them begins."""
+        """Records names before work on them begins."""
         if names:
             self._journal.append(_line({"claim": names}))
             self._journal.flush()
@@ -116,12 +116,12 @@ class Manifest:
         self.known[row["output"]] = _known(row)
 
     def same(self, name: str, identity: str) -> None:
-        """The input has another identity now, and the content that it had."""
+        """Records that the input has a new identity but the same content."""
         self._journal.append(_line({"same": name, "identity": identity}))
         self.known[name] = self.known[name]._replace(identity=identity)
 
     def rows(self) -> dict[str, dict[str, Any]]:
-        """The last row about each name, in full."""
+        """The full last row of each name."""
         self._journal.flush()
         last: dict[str, dict[str, Any]] = {}
         for _, text in self._journal.read():
@@ -138,7 +138,7 @@ class Manifest:
 
 
 class _File:
-    """One file, appended to by one write per line, locked while it is open."""
+    """A single file, locked while open, with one write per line."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -158,8 +158,8 @@ class _File:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 os.close(descriptor)
-                raise ExistsError(f"{self._path}: another batch is at work with it") from None
-            # Compaction gives the name to another file.
+                raise ExistsError(f"{self._path}: another batch uses it") from None
+            # Compaction replaces the file of this name.
             try:
                 if os.path.samestat(os.fstat(descriptor), os.stat(self._path)):
                     return descriptor
@@ -176,7 +176,7 @@ class _File:
                 whole += len(line)
                 if line.strip():
                     yield f"{self._path}: line {number}", line.decode("utf-8", "surrogateescape")
-        if os.fstat(self._descriptor).st_size > whole:  # the end of a line that was never finished
+        if os.fstat(self._descriptor).st_size > whole:  # an unfinished last line
             os.ftruncate(self._descriptor, whole)
 
     def append(self, line: str) -> None:
@@ -191,7 +191,7 @@ class _File:
             raise IoError(f"{self._path}: {error.strerror}") from error
 
     def flush(self) -> None:
-        """Every line is with the system already."""
+        """Nothing to do: every line is already written."""
 
     def wants_compaction(self) -> bool:
         return False
@@ -220,7 +220,7 @@ class _File:
 
 
 class _Segments:
-    """A folder of files, each written once and whole. Their names sort by time."""
+    """A folder of files, each written once as a whole, with names that sort by time."""
 
     def __init__(self, uri: str) -> None:
         self._uri = uri
@@ -274,9 +274,9 @@ class _Segments:
     def replace(self, lines: list[str]) -> None:
         old = self._names()
         self._write([line.rstrip("\n") for line in lines])
-        # The same rows in two places are harmless, should this be the end.
+        # If this is interrupted, duplicate rows are harmless.
         for name in old:
             self._fs.rm_file(name)
 
     def close(self) -> None:
-        """flush() has written all."""
+        """Nothing to do: flush() has written everything."""

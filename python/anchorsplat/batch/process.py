@@ -1,4 +1,4 @@
-"""Tasks on folders: a command of the program each, on files that every machine finds under the same path."""
+"""Tasks that run one command each, on files with the same path on every machine."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ class ProcessJob:
     name: str  # in messages
     arguments: tuple[str, ...]
     engine: Engine
-    folder: str  # that all machines share
-    token: str  # of a file in it, which shows that they do
-    timeout: float = 0  # seconds; 0: any
+    folder: str  # shared by all machines
+    token: str  # name of a file in it that proves it
+    timeout: float = 0  # seconds; 0: none
     log: str | None = None
 
 
 def run_process(job: ProcessJob) -> dict[str, Any]:
-    """A row: state "done", or "failed" with its error."""
+    """Runs the command. Returns a row: state "done", or "failed" with its error."""
     begin = time.time()
     row: dict[str, Any] = {"name": job.name, "worker": f"{socket.gethostname()}:{os.getpid()}"}
     if engine() != job.engine:
@@ -62,7 +62,7 @@ def _outcome(job: ProcessJob, ended: Ended) -> dict[str, Any]:
 
 
 def last_words(log: Path) -> list[str]:
-    """The last thing that a program said."""
+    """Last line of a program's output."""
     try:
         lines = [line.strip() for line in log.read_text("utf-8", "replace").splitlines() if line.strip()]
     except OSError:
@@ -71,23 +71,23 @@ def last_words(log: Path) -> list[str]:
 
 
 def shared_folder(path: str) -> str:
-    """Absolute. Errors: BadArgumentError: not a path."""
+    """Absolute path. Raises BadArgumentError if it is not a path."""
     if not storage.is_local(path):
-        raise BadArgumentError(f"{path}: has to be a folder that all machines share, not a URL")
+        raise BadArgumentError(f"{path}: must be a folder shared by all machines, not a URL")
     return storage.absolute(path)
 
 
 def ask(arguments: Sequence[str]) -> dict[str, Any]:
-    """What the program answers in JSON. Errors: its own, by its code."""
+    """JSON output of the program. Raises its error, by exit code."""
     ended = run(list(arguments))
     ended.raise_for_code()
     if not isinstance(ended.document, dict):
-        raise BadFileError("the program's answer is no JSON")
+        raise BadFileError("the program's output is not JSON")
     return ended.document
 
 
 class SharedFolder:
-    """A folder of results, marked for as long as a batch works there, so that a worker can tell whether it sees the same.
+    """A folder of results, marked during a batch so that a worker can check that it sees the same folder.
 
     Errors: ExistsError: another batch is at work there; IoError.
     """
@@ -102,12 +102,12 @@ class SharedFolder:
             self._state.mkdir(parents=True, exist_ok=True)
             self._lock = open(self._state / "lock", "wb")
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            for left in self._state.glob("token-*"):  # of a batch that was killed
+            for left in self._state.glob("token-*"):  # left by a killed batch
                 left.unlink()
             (self._state / self.token).touch()
         except BlockingIOError:
             self._lock.close()
-            raise ExistsError(f"{self.path}: another batch is at work here") from None
+            raise ExistsError(f"{self.path}: another batch is running here") from None
         except OSError as error:
             raise IoError(f"{self.path}: {error.strerror}") from error
         return self
@@ -129,8 +129,8 @@ def run_processes(
     what: str,
     memory: int,
 ) -> Counts:
-    """Runs lists of jobs one after the other, as the generator `stages` gives them: each list when the one before it has
-    ended. Jobs of the same list run side by side, and those that failed are said."""
+    """Runs the lists of jobs from the generator `stages` one after the other. Jobs of one list run in parallel. Failed jobs are
+    reported."""
     counts = Counts(total)
     progress = Progress(what, counts, quiet=how.quiet, show=how.show)
 

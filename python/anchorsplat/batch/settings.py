@@ -1,4 +1,4 @@
-"""The options of `enhance` that a batch passes on, and the files that they name."""
+"""Options of `enhance` that a batch passes on, and their files."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from . import storage
 from .engine import Engine, engine, options, run
 from .inputs import Input
 
-#: Of `enhance`, what the batch itself says to it.
+#: Options of `enhance` that the batch sets itself.
 OWN = {"--output", "--out-dir", "--json", "--quiet", "--overwrite", "--threads", "--checkpoint", "--resume"}
 
-#: Options whose value is a file or a folder; they may be URLs and hold {folder}, {stem} and {name} of the input.
+#: Options whose value is a file or folder. It may be a URL and contain {folder}, {stem} and {name} of the input.
 FILES = ("--cameras", "--images", "--model")
 
 # Bytes of memory per byte of file: measured with the network, whose result has four times as many Gaussians
@@ -36,7 +36,7 @@ _LEAST_STEP = 256 << 20
 
 
 def as_arguments(words: Mapping[str, Any]) -> dict[str, Any]:
-    """Keywords of a function as options: pixel_size=0.1 is --pixel-size. Errors: BadArgumentError: there is none such."""
+    """Keywords of a function as options: pixel_size=0.1 is --pixel-size. Raises BadArgumentError for an unknown one."""
     known = options("enhance")
     given = {}
     for word, value in words.items():
@@ -53,19 +53,19 @@ def as_arguments(words: Mapping[str, Any]) -> dict[str, Any]:
 
 def _word(name: str, value: Any) -> str:
     if name in ("cameras", "images", "model") and not isinstance(value, (str, os.PathLike)):
-        raise BadArgumentError(f"{name}: batches take a file or a folder here, found {type(value).__name__}")
+        raise BadArgumentError(f"{name}: expected a file or folder, found {type(value).__name__}")
     return os.fsdecode(text_of(name, value))
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Options of all splats of a batch: those without files, and those that name some."""
+    """Options for all splats of a batch, with and without files."""
 
     plain: tuple[str, ...]  # "--upscale=4", sorted
     files: tuple[tuple[str, str], ...]  # option, address or pattern
     engine: Engine
-    fingerprint: str  # of program, options, format, and the content of the files that are the same for all
-    common: tuple[tuple[str, str, str], ...]  # option, address, identity: files that are the same for all
+    fingerprint: str  # of program, options, format and content of common files
+    common: tuple[tuple[str, str, str], ...]  # option, address, identity of common files
     refines: bool
     resumes: bool
 
@@ -73,7 +73,7 @@ class Settings:
         return [*self.plain, *(f"{name}={value}" for name, value in self.files)]
 
     def memory(self, item: Input, threads: int) -> int:
-        """Bytes that a task is likely to take: steps of a power of two, as Ray keeps a queue per amount."""
+        """Expected memory of a task in bytes, rounded to powers of two, as Ray keeps a queue per amount."""
         name = item.uri.lower()
         factor = next((f for end, f in reversed(_PER_BYTE.items()) if name.endswith("." + end)), _OTHER_PER_BYTE)
         if name.endswith(".compressed.ply"):
@@ -86,7 +86,7 @@ class Settings:
 
 
 def settings_of(given: Mapping[str, Any], format: str | None, *, local_target: bool) -> Settings:
-    """Errors: BadArgumentError with the program's own words; NotFoundError: a file for all splats is not there."""
+    """Raises BadArgumentError with the program's message; NotFoundError if a common file is missing."""
     plain, files = [], []
     for name, value in sorted(given.items()):
         if name in FILES:
@@ -125,8 +125,8 @@ _OF_CAMERAS = {"--train-width", "--camera-rule"}
 
 
 def _check(plain: list[str], files: list[tuple[str, str]], format: str | None) -> None:
-    """Lets the program look at the options before any splat is fetched. It complains of some before it misses the input,
-    and of others, as values out of range, with a splat at hand. Errors: BadArgumentError, in its words."""
+    """Lets the program check the options before any splat is fetched: once without an input, and once with a small splat, for
+    checks such as ranges. Raises BadArgumentError with its message."""
     with tempfile.TemporaryDirectory(prefix="anchorsplat-") as folder:
         out = ["-o", f"{folder}/out.{format or 'ply'}", "--json", *plain]
         words = [word for name, value in files for word in (name, value)]
@@ -134,9 +134,9 @@ def _check(plain: list[str], files: list[tuple[str, str]], format: str | None) -
         if ended.code == 2:
             ended.raise_for_code()
         if any(method in " ".join(plain) for method in ("refine", "--quality=good", "--quality=best")):
-            return  # takes long, whatever the splat
-        # A Gaussian is in no camera's view, and weights belong to options of their own: without the files, then, and
-        # without what has an effect with them only.
+            return  # takes long for any splat
+        # Without files, and without options that only have an effect with them: the test splat is in no camera's view, and
+        # weights bring options of their own.
         if not {name for name, _ in files} <= {"--cameras"}:
             return
         alone = [word for word in out if word.partition("=")[0] not in _OF_CAMERAS]
@@ -156,7 +156,7 @@ def _one_gaussian() -> bytes:
 
 
 def files_of(settings: Settings, item: Input) -> tuple[list[tuple[str, str, str]], str]:
-    """The files that options name for this input, with their identities, and the fingerprint with these in it.
+    """Files of the options for this input, with identities, and the fingerprint that includes them.
 
     Errors: NotFoundError: one is not there; BadArgumentError: a placeholder that there is not.
     """
@@ -169,7 +169,7 @@ def files_of(settings: Settings, item: Input) -> tuple[list[tuple[str, str, str]
         try:
             uri = pattern.format(folder=posixpath.dirname(item.uri), name=base, stem=base.split(".")[0])
         except (KeyError, IndexError, ValueError) as error:
-            raise BadArgumentError(f"{name} {pattern}: only {{folder}}, {{stem}} and {{name}} can stand there") from error
+            raise BadArgumentError(f"{name} {pattern}: only {{folder}}, {{stem}} and {{name}} are allowed") from error
         uri = storage.absolute(uri)
         state = storage.state_of_tree(uri)
         if not state:

@@ -1,4 +1,4 @@
-"""Files wherever fsspec finds them. Whatever is written gets its name when it is whole."""
+"""Files on any fsspec file system. Written files appear only when complete."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from fsspec.utils import get_protocol
 
 from .._errors import IoError, NotFoundError
 
-#: Where an object has its name only when it is complete; elsewhere it is written under another name and moved.
+#: File systems where objects appear only when complete. Elsewhere files are written under another name and moved.
 _PUTS_WHOLE = {"s3", "s3a", "gs", "gcs", "abfs", "abfss", "az", "adl", "oci", "r2", "memory"}
 
-#: Of what a file system says about a file, that which changes with its content, best first.
+#: Keys of file information that change with the content, best first.
 _MARKS = ("ETag", "etag", "generation", "md5Hash", "LastModified", "last_modified", "Last-Modified", "mtime", "created")
 
 
 class TransientError(Exception):
-    """Something failed in a way that may pass, as storage does: the task is tried again, elsewhere or here."""
+    """A temporary failure, as of storage: the task is retried."""
 
-    code = "io"  # of the row, when that was in vain
+    code = "io"  # of the row if retries fail
 
 
 def is_local(uri: str) -> bool:
@@ -34,12 +34,12 @@ def is_local(uri: str) -> bool:
 
 
 def in_driver_only(uri: str) -> bool:
-    """memory:// is in the memory of one process: its bytes travel with the tasks."""
+    """Files of memory:// exist in one process only, so their bytes are sent with the tasks."""
     return bool(get_protocol(uri) == "memory")
 
 
 def absolute(uri: str) -> str:
-    """Local paths without protocol and absolute, so that a worker elsewhere means the same; URLs as listings have them."""
+    """Normalised address: local paths absolute and without protocol, valid in any worker; URLs as in listings."""
     fs, path = open_place(uri)
     return os.path.abspath(path) if is_local(uri) else fs.unstrip_protocol(path)
 
@@ -49,12 +49,12 @@ def join(folder: str, name: str) -> str:
 
 
 def same_file_system(uri: str, fs: Any, path: str) -> str:
-    """What a listing of `uri` calls `path`, as an address."""
+    """Address of `path` from a listing of `uri`."""
     return path if is_local(uri) else fs.unstrip_protocol(path)
 
 
 def open_place(uri: str) -> tuple[Any, str]:
-    """The file system and the path on it. Errors: NotFoundError, with the package that has the protocol."""
+    """File system and path on it. Raises NotFoundError, naming the package for the protocol."""
     try:
         fs, path = url_to_fs(uri)
         return fs, path
@@ -63,8 +63,8 @@ def open_place(uri: str) -> tuple[Any, str]:
 
 
 def identity(info: dict[str, Any]) -> str:
-    """A file's size and what changes with its content, without reading it. "" where there is nothing to tell by."""
-    if "ino" in info and "mtime" in info:  # local: a listing rounds the time, the system does not
+    """Size and identity of a file, without reading it. The identity changes with the content; "" if unknown."""
+    if "ino" in info and "mtime" in info:  # local; listings round the time
         try:
             state = os.stat(info["name"])
         except OSError:
@@ -77,7 +77,7 @@ def identity(info: dict[str, Any]) -> str:
 
 
 def stat(uri: str) -> dict[str, Any] | None:
-    """What its file system says about a file; None where there is none."""
+    """File information, or None if there is no such file."""
     fs, path = open_place(uri)
     try:
         info = fs.info(path)
@@ -87,7 +87,7 @@ def stat(uri: str) -> dict[str, Any] | None:
 
 
 def stat_many(uris: list[str]) -> dict[str, dict[str, Any] | None]:
-    """stat() of many: where a folder has more than a few of them it is listed once, the rest are asked side by side."""
+    """stat() of many files: folders with several of them are listed once, the rest are queried in parallel."""
     folders: dict[str, list[str]] = {}
     for uri in uris:
         folders.setdefault(uri.rsplit("/", 1)[0], []).append(uri)
@@ -112,7 +112,7 @@ def stat_many(uris: list[str]) -> dict[str, dict[str, Any] | None]:
 
 
 def sizes_below(uri: str, names: list[str]) -> dict[str, int]:
-    """Sizes of those of the files that are there."""
+    """Sizes of the files that exist."""
     if is_local(uri):
         sizes = {}
         for name in names:
@@ -131,7 +131,7 @@ def sizes_below(uri: str, names: list[str]) -> dict[str, int]:
 
 
 def fetch(uri: str, to: Path) -> None:
-    """Copies a file, or a folder with all that is in it, to this machine. Errors: NotFoundError; TransientError."""
+    """Copies a file or folder to this machine. Raises NotFoundError, TransientError."""
     fs, path = open_place(uri)
     try:
         if get_protocol(uri) not in ("http", "https") and fs.isdir(path):
@@ -144,12 +144,12 @@ def fetch(uri: str, to: Path) -> None:
         raise IoError(f"{uri}: not allowed: {error}") from error
     except (TimeoutError, OSError) as error:
         raise TransientError(f"{uri}: could not be read: {error}") from error
-    except Exception as error:  # what clients of object stores raise is of no common family
+    except Exception as error:  # clients of object stores have no common exception
         raise TransientError(f"{uri}: could not be read: {type(error).__name__}: {error}") from error
 
 
 def put(file: Path, uri: str) -> None:
-    """Moves a file of this machine to where it belongs: whole or not at all. Errors: IoError; TransientError."""
+    """Moves a local file to its address, whole or not at all. Raises IoError, TransientError."""
     if is_local(uri):
         target = Path(absolute(uri))
         try:
@@ -178,7 +178,7 @@ def put(file: Path, uri: str) -> None:
     except PermissionError as error:
         raise IoError(f"{uri}: not allowed: {error}") from error
     except NotImplementedError as error:
-        raise IoError(f"{uri}: nothing can be written there") from error
+        raise IoError(f"{uri}: this address is not writable") from error
     except Exception as error:
         raise TransientError(f"{uri}: could not be written: {type(error).__name__}: {error}") from error
     file.unlink()
@@ -190,7 +190,7 @@ def sha256(file: Path) -> str:
 
 
 def state_of_tree(uri: str) -> str:
-    """Identity of a file, or of a folder: of the names, sizes and marks of all that is in it. "" where it is not there."""
+    """Identity of a file, or of a folder from the names, sizes and identities of its files. "" if missing."""
     fs, path = open_place(uri)
     try:
         if not fs.isdir(path):

@@ -1,4 +1,4 @@
-"""What a worker does with one splat. Nothing here knows Ray."""
+"""What a worker does with one splat, independent of Ray."""
 
 from __future__ import annotations
 
@@ -22,42 +22,42 @@ from .engine import Ended, Engine, engine, run
 
 @dataclass(frozen=True)
 class SplatJob:
-    """One splat: all that a worker needs to know of it."""
+    """One splat, with all that a worker needs."""
 
     output: str  # name of the result
     input: str  # address
     target: str  # address of the folder of results
     arguments: tuple[str, ...]  # of `enhance`, without files
-    files: tuple[tuple[str, str, str], ...]  # option, address, identity: of files that options name
+    files: tuple[tuple[str, str, str], ...]  # option, address, identity of files of options
     engine: Engine
     threads: int
-    memory: int  # bytes that it is likely to take
+    memory: int  # expected bytes
     identity: str
     fingerprint: str
-    work: str | None = None  # folder beside the results, where they come into being; None: this machine's own
-    checkpoint: str | None = None  # where an interrupted refinement leaves its state
-    known_sha256: str = ""  # of the input that the result which is there was made of, with the same options
+    work: str | None = None  # folder beside the results for unfinished files; None: one of this machine
+    checkpoint: str | None = None  # state of an interrupted refinement
+    known_sha256: str = ""  # of the input of the existing result, if made with the same options
     known_output_sha256: str = ""
-    verify: bool = False  # read the result that is there, too
-    content: bytes | None = field(default=None, repr=False)  # of an input in the driver's memory
+    verify: bool = False  # also read the existing result
+    content: bytes | None = field(default=None, repr=False)  # of an input in memory of the driver
 
     def base_row(self) -> dict[str, Any]:
         return {"output": self.output, "input": self.input, "identity": self.identity, "fingerprint": self.fingerprint}
 
 
 class ProgramKilledError(storage.TransientError):
-    """Somebody killed the program, as a system does that is short of memory."""
+    """The program was killed, for example by a system short of memory."""
 
     code = "killed"
 
 
-# A result may take so much more than expected before the system refuses it memory.
+# A task may use this much more than expected before the system refuses memory.
 _MEMORY_SLACK = 4
 _LEAST_MEMORY = 2 << 30
 
 
 def enhance_one(job: SplatJob) -> dict[str, Any]:
-    """Fetches the input, runs the program and puts the result in its place. A row of the manifest, whatever happens.
+    """Fetches the input, runs the program and stores the result. Always returns a row of the manifest.
 
     Raises only TransientError, when storage failed in a way that may pass or the program was killed.
     """
@@ -92,10 +92,10 @@ def _enhance(job: SplatJob) -> dict[str, Any]:
         )
     with _work_folder(job.work) as folder, ThreadPoolExecutor(1) as beside:
         source = _input(job, folder)
-        if source.is_fifo() or source.is_socket() or source.is_char_device():  # which may never end
+        if source.is_fifo() or source.is_socket() or source.is_char_device():  # may never end
             return failed("io", f"{job.input}: is no file that can be read twice")
         size = source.stat().st_size
-        hashing = beside.submit(storage.sha256, source)  # while the program works
+        hashing = beside.submit(storage.sha256, source)  # in parallel with the program
         if job.known_sha256 and job.known_sha256 == hashing.result() and _result_stands(job, folder):
             return {"state": "done", "unchanged": True, "size": size, "sha256": job.known_sha256}
         result = folder / "result" / Path(job.output).name
@@ -106,7 +106,7 @@ def _enhance(job: SplatJob) -> dict[str, Any]:
         if ended.code or ended.signal:
             error = ended.error()
             if ended.signal == signal.SIGKILL:
-                raise ProgramKilledError(f"every program that tried it was killed: {error['message']}")
+                raise ProgramKilledError(f"the program was killed in every attempt: {error['message']}")
             error["message"] = error["message"].replace(str(source), job.input).replace(str(result), job.output)
             return {**told, "state": "failed", "error": error}
         if storage.is_local(job.input) and _identity(job.input) != job.identity:
@@ -122,7 +122,7 @@ def _identity(uri: str) -> str:
 
 
 def _input(job: SplatJob, folder: Path) -> Path:
-    """The input as a file of this machine."""
+    """The input as a local file."""
     if job.content is None and storage.is_local(job.input):
         path = Path(job.input)
     else:
@@ -157,7 +157,7 @@ def _arguments(job: SplatJob, source: Path, result: Path) -> list[str]:
 
 
 def _report(ended: Ended) -> dict[str, Any]:
-    """Of the program's --json, what a manifest needs."""
+    """The part of the program's --json for the manifest."""
     document = ended.document
     if isinstance(document, list):
         document = document[0] if document else {}
@@ -167,7 +167,7 @@ def _report(ended: Ended) -> dict[str, Any]:
 
 
 def _put(job: SplatJob, result: Path) -> dict[str, Any]:
-    """Moves what the program wrote to its place, the result itself last."""
+    """Moves the program's output to its place, the result itself last."""
     sha256, size = storage.sha256(result), result.stat().st_size
     told: dict[str, Any] = {"output_size": size, "output_sha256": sha256}
     beside = sorted(path for path in result.parent.iterdir() if path != result)
@@ -185,12 +185,12 @@ def _put(job: SplatJob, result: Path) -> dict[str, Any]:
     return told
 
 
-# Folders of this worker process. What processes left that are no more is removed by the next one that begins.
+# Folders of this worker process. The next process removes those of ended processes.
 
 
 @contextlib.contextmanager
 def _work_folder(beside_results: str | None) -> Iterator[Path]:
-    """For one task, gone afterwards. Where results are on a local file system it is there, so that they only need renaming."""
+    """A folder for one task, removed afterwards. On the file system of local results, so that they only need renaming."""
     root = Path(beside_results) / _me() if beside_results else _scratch()
     root.mkdir(parents=True, exist_ok=True)
     folder = Path(tempfile.mkdtemp(dir=root))
@@ -208,14 +208,14 @@ _scratch_folder: Path | None = None
 
 
 def _scratch() -> Path:
-    """This process's own folder on this machine. TMPDIR says where."""
+    """This process's own local folder, in TMPDIR."""
     global _scratch_folder
     if _scratch_folder is None:
         root = Path(tempfile.gettempdir()) / f"anchorsplat-batch-{os.getuid()}"
         root.mkdir(mode=0o700, exist_ok=True)
         state = root.lstat()
         if state.st_uid != os.getuid() or root.is_symlink():
-            raise IoError(f"{root}: belongs to somebody else; set TMPDIR")
+            raise IoError(f"{root}: belongs to another user; set TMPDIR")
         for left in root.iterdir():
             if left.name.isdigit() and not Path(f"/proc/{left.name}").exists():
                 shutil.rmtree(left, ignore_errors=True)
@@ -229,7 +229,7 @@ _kept: dict[tuple[str, str], Path] = {}
 
 
 def _cached(uri: str, identity: str) -> Path:
-    """A file or folder that an option names, on this machine: weights are fetched once, not with every splat."""
+    """Local copy of a file or folder of an option. Weights are fetched once, not for every splat."""
     if storage.is_local(uri):
         return Path(uri)
     key = (uri, identity)

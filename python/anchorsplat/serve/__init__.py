@@ -5,12 +5,12 @@ from __future__ import annotations
 import importlib.util
 import sys
 
-#: Modules that come with ``pip install "anchorsplat[serve]"``.
+#: Modules installed by ``pip install "anchorsplat[serve]"``.
 _NEEDED = ("fastapi", "uvicorn", "python_multipart", "prometheus_client")
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Runs the service until it is stopped. Returns the exit code, as docs/cli.md has them."""
+    """Runs the service until it is stopped. Returns the exit code (docs/cli.md)."""
     from .settings import UsageError, parse
 
     try:
@@ -21,12 +21,12 @@ def main(argv: list[str] | None = None) -> int:
     missing = [name for name in _NEEDED if importlib.util.find_spec(name) is None]
     if missing:
         print(
-            f"error: 'serve' needs {', '.join(missing)}: pip install 'anchorsplat[serve]' brings all of it",
+            f"error: 'serve' needs {', '.join(missing)}: run pip install 'anchorsplat[serve]'",
             file=sys.stderr,
         )
         return 2
     if settings.ray is not None and importlib.util.find_spec("ray") is None:
-        print("error: --ray needs Ray: pip install 'anchorsplat[batch]' brings it", file=sys.stderr)
+        print("error: --ray needs Ray: run pip install 'anchorsplat[batch]'", file=sys.stderr)
         return 2
     from .server import run
 

@@ -67,8 +67,8 @@ def bad_options(error: ValidationError) -> ApiError:
         {"option": ".".join(map(str, e["loc"])) or "options", "message": e["msg"].removeprefix("Value error, ")}
         for e in error.errors()
     ]
-    # A union complains once for each of its kinds; the first name of the place is the option. Without a place the sentence
-    # names it.
+    # A union reports an error per member; the first name of its location is the option. Without a location the message names
+    # it.
     sentences = dict.fromkeys(
         d["message"] if d["option"] == "options" else f"{d['option'].split('.')[0]}: {d['message']}" for d in details
     )
@@ -87,9 +87,9 @@ class Service:
         self._one_at_a_time = asyncio.Lock()
 
     async def submit(self, kind: str, request: Request) -> JSONResponse:
-        """Takes an upload in: 202 with a job that waits, 200 where its result is there already."""
+        """Accepts an upload: 202 with a queued job, or 200 if its result exists."""
         pairs = [pair for pair in request.query_params.multi_items() if pair[0] != "name"]
-        validate(kind, pairs)  # before gigabytes are sent in vain
+        validate(kind, pairs)  # before receiving gigabytes
         scheduler, store = self.scheduler, self.store
         scheduler.admit()
         scheduler.uploading += 1
@@ -122,7 +122,7 @@ class Service:
         )
 
     async def _known_input(self, upload: Upload) -> tuple[str, dict]:
-        # Only this format cannot be told by its content; that it is one is then a matter of the name.
+        # Only this format cannot be recognised by content, so the name decides.
         hint = ".splat" if upload.name.lower().endswith(".splat") else ""
         input_id = upload.sha256 + hint
         facts = self.store.input_facts(input_id)
@@ -131,7 +131,7 @@ class Service:
         if facts["gaussians"] > self.settings.max_gaussians:
             raise Refused(
                 "too_large",
-                f"{upload.name} has {facts['gaussians']:,} Gaussians; this service takes {self.settings.max_gaussians:,}.",
+                f"{upload.name} has {facts['gaussians']:,} Gaussians; this service accepts at most {self.settings.max_gaussians:,}.",
             )
         if facts["gaussians"] == 0:
             raise Refused("bad_file", f"{upload.name} has no Gaussians.")
@@ -142,11 +142,11 @@ class Service:
     async def _cameras(self, kind: str, options: Options, upload: Upload) -> str | None:
         if upload.cameras is None:
             if isinstance(options, EnhanceOptions) and options.train_width is not None:
-                raise ApiError(422, "bad_option", "train_width: has an effect with cameras only")
+                raise ApiError(422, "bad_option", "train_width: has an effect only with cameras")
             return None
         if kind != "enhance":
             raise ApiError(422, "bad_option", f"cameras: have no effect on {kind}")
-        async with self._one_at_a_time:  # numbers as Python has them take ten times the memory
+        async with self._one_at_a_time:  # numbers in Python take ten times the memory
             plain = await asyncio.to_thread(plain_cameras, upload.cameras)
         path = self.store.new_upload()
         await asyncio.to_thread(path.write_bytes, plain)
@@ -230,7 +230,7 @@ def validate(kind: str, pairs: list[tuple[str, str]]) -> Options:
     given: dict[str, str | list[tuple[str, str]]] = {}
     edits = []
     for said, value in pairs:
-        name = said.replace("-", "_")  # as on the command line, or as in a form
+        name = said.replace("-", "_")  # spelled as on the command line or as in a form
         if name in KINDS[kind].in_order:
             edits.append((name, value))
             continue
@@ -239,7 +239,7 @@ def validate(kind: str, pairs: list[tuple[str, str]]) -> Options:
         given[name] = value
     if edits:
         if "edits" in given:
-            raise ApiError(422, "bad_option", "edits: each has a name of its own, as translate")
+            raise ApiError(422, "bad_option", "edits: pass each edit by its own name, such as translate")
         given["edits"] = edits
     try:
         return KINDS[kind].model_validate(given)
@@ -305,7 +305,7 @@ def router(service: Service, static: dict[str, tuple[bytes, str]]) -> APIRouter:
         known = formats_of(work)
         wanted = format or known[0]
         if wanted not in known:
-            raise ApiError(422, "bad_option", f"format: this result comes as {', '.join(known)}")
+            raise ApiError(422, "bad_option", f"format: this result is available as {', '.join(known)}")
         ending = {"png": "png", "zip": "zip", "gltf": "gltf.zip"}.get(wanted, wanted)
         name = {"png": "view.png", "zip": "views.zip"}.get(wanted, f"result.{ending}")
         path = service.store.result_folder(work["key"]) / name
@@ -381,7 +381,7 @@ def router(service: Service, static: dict[str, tuple[bytes, str]]) -> APIRouter:
         async for chunk in request.stream():
             body += chunk
             if len(body) > 4096:
-                raise ApiError(413, "too_large", "That is no token.")
+                raise ApiError(413, "too_large", "That is not a token.")
         given = parse_qs(body.decode("latin-1")).get("token", [""])[0]
         if settings.token is None or not same(given, settings.token):
             page = static["login.html"][0].replace(b'<p id="wrong" hidden>', b'<p id="wrong">')

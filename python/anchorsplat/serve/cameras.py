@@ -1,4 +1,4 @@
-"""Training cameras that a client sent, reduced to their numbers: what they say about files is never looked at.
+"""Training cameras from a client, reduced to numbers: paths in them are never used.
 
 transforms.json (NeRF, nerfstudio) and INRIA's cameras.json. A COLMAP model is a folder of files and is not taken.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-MOST_BYTES = 4 * 2**20  # some thousand views; held in memory
+MOST_BYTES = 4 * 2**20  # thousands of views; held in memory
 _MOST_VIEWS = 50_000
 _NUMBERS = (
     "w",
@@ -32,21 +32,21 @@ _MODELS = ("PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FU
 
 
 class BadCameras(Exception):
-    """The text says what is wrong with them."""
+    """Invalid cameras; the text says why."""
 
 
 def plain_cameras(data: bytes) -> bytes:
-    """The same cameras with names of ours, as canonical JSON. Raises BadCameras."""
+    """The cameras as canonical JSON with generated names. Raises BadCameras."""
     try:
         root = json.loads(data)
     except (ValueError, RecursionError) as error:
-        raise BadCameras(f"cameras: no JSON ({error}); expected a transforms.json or a cameras.json") from None
+        raise BadCameras(f"cameras: not JSON ({error}); expected a transforms.json or a cameras.json") from None
     if isinstance(root, dict) and isinstance(root.get("frames"), list):
         plain: dict[str, Any] | list[dict[str, Any]] = _transforms(root)
     elif isinstance(root, list):
         plain = [_inria(index, entry) for index, entry in enumerate(_views(root))]
     else:
-        raise BadCameras("cameras: neither a transforms.json with frames nor INRIA's cameras.json")
+        raise BadCameras("cameras: expected a transforms.json with frames, or INRIA's cameras.json")
     return json.dumps(plain, sort_keys=True).encode()
 
 
@@ -57,7 +57,7 @@ def _views(entries: list) -> list:
 
 
 def _number(value: object, where: str) -> float | int:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < 1e30:  # NaN neither
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < 1e30:  # rejects NaN, too
         raise BadCameras(f"cameras: {where}: expected a number")
     return value
 
@@ -83,7 +83,7 @@ def _lens(level: dict, where: str) -> dict:
     model = level.get("camera_model")
     if model is not None:
         if model not in _MODELS:
-            raise BadCameras(f"cameras: {where}: a lens that is not known here; undistort the pictures first")
+            raise BadCameras(f"cameras: {where}: unsupported lens; undistort the pictures first")
         out["camera_model"] = model
     if level.get("is_fisheye") is True:
         out["is_fisheye"] = True

@@ -1,4 +1,4 @@
-"""What may be asked of a job: names, ranges and defaults are the command line's (docs/cli.md). Unknown names are refused."""
+"""Options of jobs, with the names, ranges and defaults of the command line (docs/cli.md). Unknown names are refused."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 from .. import _core
 from .._errors import BadArgumentError
 
-#: Formats that results come in, and the type that HTTP knows them by.
+#: Formats of results, with their HTTP content types.
 FORMATS = {
     "ply": "application/octet-stream",
     "compressed.ply": "application/octet-stream",
@@ -19,7 +19,7 @@ FORMATS = {
     "sog": "application/zip",
     "splat": "application/octet-stream",
     "glb": "model/gltf-binary",
-    "gltf": "application/zip",  # its numbers are in a file of their own
+    "gltf": "application/zip",  # two files
     "npz": "application/octet-stream",
     "csv": "text/csv",
 }
@@ -28,17 +28,17 @@ Mode = Literal["classic", "antialiased", "mip"]
 _COLOR = r"^(0(\.\d+)?|1(\.0+)?|\.\d+)(,(0(\.\d+)?|1(\.0+)?|\.\d+)){2}$"
 _VECTOR = r"^[-+]?\d{1,9}(\.\d{1,9})?(,[-+]?\d{1,9}(\.\d{1,9})?){2}$"
 _NUMBER = r"[-+]?(\d{1,9}(\.\d{0,18})?|\.\d{1,18})([eE][-+]?\d{1,2})?"
-# A sphere or a box. The program reads it; this only keeps what cannot be one from becoming a job.
+# A sphere or a box. The program parses it; this only rejects obvious errors early.
 _REGION = rf"^{_NUMBER}(,{_NUMBER}){{3}}((,{_NUMBER}){{2}})?$"
 
 
 class Options(BaseModel):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, validate_default=False)
-    #: What is done in its order and may stand several times, with a line about each and the form of its value.
+    #: Edits, applied in order and repeatable, with a description and the form of the value.
     in_order: ClassVar[dict[str, tuple[str, str]]] = {}
 
     def canonical(self) -> str:
-        """The same text for the same wish: what was said and what goes without saying are one."""
+        """Canonical text of a request: explicit and implied defaults are the same."""
         return json.dumps(self.model_dump(exclude_none=True), sort_keys=True)
 
 
@@ -74,7 +74,7 @@ class EnhanceOptions(Options):
     @model_validator(mode="after")
     def _belongs_together(self):
         if self.background is not None and not self.clean:
-            raise ValueError("background has an effect with clean only")
+            raise ValueError("background has an effect only with clean")
         return self
 
     def words(self, cameras: bool) -> list[str]:
@@ -88,7 +88,7 @@ class EnhanceOptions(Options):
         if self.max_gaussians:
             out += ["--max-gaussians", str(self.max_gaussians)]
         if self.region is not None:
-            out += [f"--region={self.region}"]  # one word: it may begin with a minus
+            out += [f"--region={self.region}"]  # one word, as it may begin with a minus
         if cameras:
             out += ["--cameras", "cameras.json"]
         if self.train_width is not None:
@@ -132,12 +132,12 @@ class ConvertOptions(Options):
     @model_validator(mode="after")
     def _edits_are_some(self):
         if self.action_axes is not None and not self.edits:
-            raise ValueError("action_axes has an effect with edits only, as translate")
+            raise ValueError("action_axes has an effect only with edits, such as translate")
         for name, value in self.edits:
             if name not in self.in_order:
-                raise ValueError(f"{name} is no edit")
+                raise ValueError(f"{name} is not an edit")
             if not value.isprintable():
-                raise ValueError(f"{name}: there are control characters in its value")
+                raise ValueError(f"{name}: its value contains control characters")
             try:
                 _core.check_edit(_option(name), value, self.action_axes or "LUF")
             except BadArgumentError as error:
@@ -165,7 +165,7 @@ class ConvertOptions(Options):
             out += ["--coords", self.coords]
         if self.action_axes is not None:
             out += ["--action-axes", self.action_axes]
-        for name, value in self.edits:  # one word: a value may begin with a minus
+        for name, value in self.edits:  # one word, as a value may begin with a minus
             out += [f"{_option(name)}={value}" if value else _option(name)]
         return out
 
@@ -210,7 +210,7 @@ class RenderOptions(Options):
         for name in ("radius", "target", "up", "background", "mode"):
             value = getattr(self, name)
             if value is not None:
-                out += [f"--{name}={value}"]  # one word: a value may begin with a minus
+                out += [f"--{name}={value}"]  # one word, as a value may begin with a minus
         if self.transparent:
             out += ["--transparent"]
         return out

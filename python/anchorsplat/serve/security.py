@@ -1,4 +1,4 @@
-"""Who may ask, from where, and what a browser may do with the answer. Around the whole application."""
+"""Guards the whole application: tokens, hosts and origins, and headers for browsers."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from .settings import Settings
 
 COOKIE = "anchorsplat"
 _SESSION_SECONDS = 30 * 86400
-#: What is there without a token: the way to give one, and whether the service lives.
+#: Paths that need no token: the login, and the health check.
 _OPEN = ("/healthz", "/login")
 _NOTHING = "default-src 'none'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
 PAGE_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
     "frame-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
 )
-#: The viewer is one file with its scripts in it, and a stranger's splat: without an origin, and without connections.
+#: The viewer is one file with scripts and a user's splat: no origin, no connections.
 VIEWER_POLICY = (
     "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline' blob:; worker-src blob:; img-src data: blob:; "
     "style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
 )
-#: The engine in the browser (docs/web.md): one page with its scripts in it, and the files beside it.
+#: The engine in the browser (docs/web.md): one page with scripts, and the files beside it.
 WEB_POLICY = (
     "default-src 'none'; script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval' blob:; worker-src 'self' blob:; "
     "connect-src 'self'; frame-src blob:; img-src data: blob:; style-src 'unsafe-inline'; base-uri 'none'; "
@@ -47,12 +47,12 @@ _HEADERS = {
 
 
 def same(a: str, b: str) -> bool:
-    """In constant time, whatever they are."""
+    """Compares in constant time."""
     return hmac.compare_digest(a.encode("utf-8", "replace"), b.encode("utf-8", "replace"))
 
 
 def session(token: str, now: float | None = None) -> str:
-    """A cookie's value that says that its owner knew the token. Ends with the token, and after a month."""
+    """Value of a cookie that proves knowledge of the token. Valid for a month, and only for this token."""
     until = str(int((time.time() if now is None else now) + _SESSION_SECONDS))
     return f"{until}.{_signature(token, until)}"
 
@@ -70,7 +70,7 @@ def is_session(value: str, token: str) -> bool:
 
 class Guard:
     def __init__(self, app, settings: Settings, login_page: bytes, count: Callable[[dict, int], None], service):
-        self.service = service  # for who ends it
+        self.service = service  # for shutting it down
         self._app, self._settings, self._login_page, self._count = app, settings, login_page, count
         self._hosts = {f"{name}:{settings.port}" for name in ("127.0.0.1", "localhost", "[::1]")}
         if settings.host not in ("127.0.0.1", "localhost", "::1"):
@@ -81,7 +81,7 @@ class Guard:
     async def __call__(self, scope, receive, send):
         if scope["type"] == "lifespan":
             return await self._app(scope, receive, send)
-        if scope["type"] != "http":  # there are no web sockets here
+        if scope["type"] != "http":  # no web sockets
             return await send({"type": "websocket.close", "code": 1008})
         headers = Headers(scope=scope)
 
@@ -121,12 +121,12 @@ class Guard:
             return None
         if self._is_known(headers):
             return None
-        return 401, "unauthorized", "This service wants a token: send the header 'Authorization: Bearer TOKEN'."
+        return 401, "unauthorized", "This service needs a token: send the header 'Authorization: Bearer TOKEN'."
 
     def _knows(self, host: str) -> bool:
-        """A name that a stranger's DNS points at this machine is not one of ours (DNS rebinding)."""
+        """Whether the host name is ours. Others may be DNS rebinding."""
         if not self._settings.local:
-            return bool(host)  # any name may be this machine's; the token is what counts
+            return bool(host)  # any name may be ours; the token decides
         return host in self._hosts or host.rsplit(":", 1)[0] in self._settings.allow_hosts
 
     def _is_known(self, headers: Headers) -> bool:

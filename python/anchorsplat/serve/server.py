@@ -1,4 +1,4 @@
-"""Listens, says where, and ends in order."""
+"""Listens, prints the address, and shuts down cleanly."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class _Server(uvicorn.Server):
 
     @contextlib.contextmanager
     def capture_signals(self):
-        """To be asked to end is no failure: uvicorn's own way ends the process by the signal."""
+        """A requested stop is not a failure: uvicorn itself would end the process by the signal."""
         before = {number: signal.signal(number, self.handle_exit) for number in (signal.SIGINT, signal.SIGTERM)}
         try:
             yield
@@ -34,7 +34,7 @@ class _Server(uvicorn.Server):
                 signal.signal(number, handler)
 
     def handle_exit(self, sig, frame) -> None:
-        # Those who watch a job would keep their connections, and so the service, for as long as it runs.
+        # Watchers of a job would otherwise keep their connections, and so the service, open.
         self._service.scheduler.begin_to_stop()
         super().handle_exit(sig, frame)
 
@@ -58,7 +58,7 @@ def run(settings: Settings) -> int:
         sock = listen(settings.host, settings.port)
     except OSError as error:
         print(
-            f"error: cannot listen at {settings.host}, port {settings.port}: {error.strerror or error}; --port takes another",
+            f"error: cannot listen at {settings.host}, port {settings.port}: {error.strerror or error}; pass another --port",
             file=sys.stderr,
         )
         return 6
@@ -72,7 +72,7 @@ def run(settings: Settings) -> int:
     print(f"anchorsplat serves http://{host}:{settings.port}", flush=True)
     print(
         f"  {settings.workers} at a time with {settings.threads} threads and {settings.max_memory / 2**30:.3g} GiB each"
-        f"{', on Ray' if settings.ray else ''}; jobs and results in {settings.data}; Ctrl-C ends it",
+        f"{', on Ray' if settings.ray else ''}; jobs and results in {settings.data}; stop with Ctrl-C",
         flush=True,
     )
     config = uvicorn.Config(

@@ -1,4 +1,4 @@
-"""What the service was told on its command line."""
+"""Settings of the service, from its command line."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _LEAST_TOKEN = 16
 
 
 class UsageError(Exception):
-    """The command line makes no sense; the text says why and what would."""
+    """Invalid command line; the text says why and what is valid."""
 
 
 @dataclass(frozen=True)
@@ -29,15 +29,15 @@ class Settings:
     max_upload: int = 2 * 10**9  # bytes
     max_gaussians: int = 10_000_000
     max_seconds: float = 600.0
-    max_memory: int = 4 * 2**30  # bytes of address space, of each job
+    max_memory: int = 4 * 2**30  # bytes of address space per job
     queue: int = 64
     workers: int = 1
-    threads: int = 1  # of each job
+    threads: int = 1  # per job
     keep_days: float = 7.0
     keep_bytes: int = 20 * 10**9
     ray: str | None = None
-    web: Path | None = None  # the folder of the page that `make web` makes
-    stall_seconds: float = 30.0  # of an upload that sends nothing
+    web: Path | None = None  # folder of the page of `make web`
+    stall_seconds: float = 30.0  # for an upload that sends nothing
 
     @property
     def local(self) -> bool:
@@ -58,7 +58,7 @@ def parse_bytes(text: str) -> int:
     """ "500 MB", "2GiB" or a plain number of bytes."""
     match = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*([A-Za-z]*)\s*", text)
     if not match or match[2].upper() not in _UNITS:
-        raise argparse.ArgumentTypeError(f"'{text}' is no size such as 500MB or 2GiB")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a size such as 500MB or 2GiB")
     size = int(float(match[1]) * _UNITS[match[2].upper()])
     if not 1 <= size < 2**62:
         raise argparse.ArgumentTypeError(f"'{text}' must be at least one byte and less than 2^62")
@@ -70,7 +70,7 @@ def _number(low: float, high: float, kind: type = int):
         try:
             value = kind(text)
         except ValueError:
-            raise argparse.ArgumentTypeError(f"'{text}' is no number") from None
+            raise argparse.ArgumentTypeError(f"'{text}' is not a number") from None
         if not math.isfinite(value) or not low <= value <= high:
             raise argparse.ArgumentTypeError(f"'{text}' must be from {low:,} to {high:,}")
         return value
@@ -105,35 +105,35 @@ def _parser() -> argparse.ArgumentParser:
     add(
         "--host",
         default="127.0.0.1",
-        help="address to listen at; any but this machine's own needs a token (%(default)s)",
+        help="address to listen on; any but loopback needs a token (%(default)s)",
     )
-    add("--port", type=_number(0, 65535), default=7860, help="0 takes a free one and says which (%(default)s)")
+    add("--port", type=_number(0, 65535), default=7860, help="port; 0 picks a free one and prints it (%(default)s)")
     add("--data", type=Path, default=_data_folder(), metavar="DIR", help="jobs, uploads and results (%(default)s)")
-    add("--token", help="who knows it may use the service; better as ANCHORSPLAT_TOKEN, which other users cannot see")
+    add("--token", help="token that clients must send; better set as ANCHORSPLAT_TOKEN, which other users cannot see")
     add(
         "--allow-host",
         action="append",
         default=[],
         metavar="NAME",
-        help="another name under which a proxy on this machine forwards to the service; needs a token (repeatable)",
+        help="another host name that a proxy on this machine forwards; needs a token (repeatable)",
     )
-    add("--max-upload", type=parse_bytes, default=Settings.max_upload, metavar="SIZE", help="of one file (2GB)")
+    add("--max-upload", type=parse_bytes, default=Settings.max_upload, metavar="SIZE", help="largest upload (2GB)")
     add(
         "--max-gaussians",
         type=_number(1, 2**31 - 1),
         default=Settings.max_gaussians,
         metavar="N",
-        help="of one splat (%(default)s)",
+        help="most Gaussians of a splat (%(default)s)",
     )
     add(
         "--max-seconds",
         type=_number(0.1, 1e6, float),
         default=Settings.max_seconds,
         metavar="S",
-        help="of one job (%(default)s)",
+        help="time limit of a job (%(default)s)",
     )
     add(
-        "--max-memory", type=parse_bytes, metavar="SIZE", help="of one job (3/4 of the machine, shared among --workers)"
+        "--max-memory", type=parse_bytes, metavar="SIZE", help="memory limit of a job (3/4 of the machine, shared among --workers)"
     )
     add(
         "--queue",
@@ -143,37 +143,37 @@ def _parser() -> argparse.ArgumentParser:
         help="jobs that may wait; more are answered with 429 (%(default)s)",
     )
     add("--workers", type=_number(1, 256), metavar="N", help="jobs at the same time (1 for each 4 processors)")
-    add("--threads", type=_number(1, 1024), metavar="N", help="of each job (the processors, shared among --workers)")
+    add("--threads", type=_number(1, 1024), metavar="N", help="threads of a job (the processors, shared among --workers)")
     add(
         "--keep-days",
         type=_number(0, 36500, float),
         default=Settings.keep_days,
         metavar="D",
-        help="results that nobody asked for so long are deleted (%(default)s)",
+        help="days after which unused results are deleted (%(default)s)",
     )
     add(
         "--keep-bytes",
         type=parse_bytes,
         default=Settings.keep_bytes,
         metavar="SIZE",
-        help="of all uploads and results; the oldest go first (20GB)",
+        help="limit of all uploads and results; the oldest are deleted first (20GB)",
     )
     add(
         "--ray",
         metavar="ADDRESS",
-        help="send jobs to this Ray cluster (host:port, auto, or local) and not to processes of this machine",
+        help="run jobs on this Ray cluster (host:port, auto, or local) instead of in local processes",
     )
     add(
         "--web",
         type=Path,
         metavar="DIR",
-        help="build/web/dist of `make web`: the page that works without uploads, linked and served at /web/",
+        help="build/web/dist of `make web`, to serve the page that works without uploads at /web/",
     )
     return parser
 
 
 def parse(argv: list[str]) -> Settings:
-    """Raises UsageError. --help prints and raises SystemExit, as argparse has it."""
+    """Raises UsageError. --help prints and raises SystemExit, as in argparse."""
     given = _parser().parse_args(argv)
     token = given.token if given.token is not None else os.environ.get("ANCHORSPLAT_TOKEN")
     if token is not None and (
@@ -181,7 +181,7 @@ def parse(argv: list[str]) -> Settings:
     ):
         raise UsageError(
             f"the token must be at least {_LEAST_TOKEN} printable ASCII characters without spaces; "
-            "python3 -c 'import secrets; print(secrets.token_urlsafe())' makes one"
+            "python3 -c 'import secrets; print(secrets.token_urlsafe())' generates one"
         )
     if not is_loopback(given.host) and token is None:
         raise UsageError(
@@ -191,7 +191,7 @@ def parse(argv: list[str]) -> Settings:
     if given.allow_host and token is None:
         raise UsageError("--allow-host lets others in through a proxy, so it needs a token (ANCHORSPLAT_TOKEN)")
     if given.web is not None and not (given.web / "index.html").is_file():
-        raise UsageError(f"--web: {given.web} has no index.html; `make web` makes build/web/dist")
+        raise UsageError(f"--web: {given.web} has no index.html; `make web` creates build/web/dist")
     processors = len(os.sched_getaffinity(0))
     workers = given.workers or max(1, processors // 4)
     return Settings(

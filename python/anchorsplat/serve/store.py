@@ -1,4 +1,4 @@
-"""What outlives the service: jobs in SQLite, uploads and results in folders beside it.
+"""Persistent state: jobs in SQLite, uploads and results in folders beside it.
 
     DIR/lock          held by the one service that works here
     DIR/jobs.sqlite3
@@ -37,13 +37,13 @@ CREATE TABLE jobs (id TEXT PRIMARY KEY, key TEXT NOT NULL, name TEXT NOT NULL, c
 CREATE INDEX jobs_of_work ON jobs (key);
 """
 
-_MOST_STARTS = 3  # of a work that is running when the service is killed
+_MOST_STARTS = 3  # of a work, if the service is killed while it runs
 QUEUED, RUNNING, DONE, FAILED, CANCELLED = "queued", "running", "done", "failed", "cancelled"
 ENDED = (DONE, FAILED, CANCELLED)
 
 
 class DataInUse(Exception):
-    """Another service works in the folder."""
+    """Another service uses the folder."""
 
 
 class Store:
@@ -58,15 +58,15 @@ class Store:
         except BlockingIOError:
             self._lock.close()
             raise DataInUse(
-                f"{folder}: another 'anchorsplat serve' works in this folder; end it, or give --data another one"
+                f"{folder}: another 'anchorsplat serve' uses this folder; stop it, or pass another --data"
             ) from None
         try:
             self._open()
         except sqlite3.DatabaseError as error:
             self.close()
             raise DataInUse(
-                f"{folder / 'jobs.sqlite3'}: cannot be read ({error}); give --data another folder, or move this file away "
-                "to begin with no jobs"
+                f"{folder / 'jobs.sqlite3'}: cannot be read ({error}); pass another --data, or move this file away "
+                "to start without jobs"
             ) from None
 
     def _open(self) -> None:
@@ -81,7 +81,7 @@ class Store:
         elif version != _SCHEMA_VERSION:
             self.close()
             raise DataInUse(
-                f"{folder}: made by another version of anchorsplat (schema {version}); give --data another folder"
+                f"{folder}: made by another version of anchorsplat (schema {version}); pass another --data"
             )
         self._begin()
 
@@ -90,7 +90,7 @@ class Store:
         self._lock.close()
 
     def _begin(self) -> None:
-        """What ran when the last service ended is queued again; what it left half-done is cleared away."""
+        """Queues works again that ran when the last service ended, and removes unfinished files."""
         self._db.execute(
             "UPDATE works SET state=?, finished=?, error_code='killed', error=? WHERE state=? AND attempts>=?",
             (
@@ -102,17 +102,17 @@ class Store:
             ),
         )
         self._db.execute("UPDATE works SET state=?, started=NULL WHERE state=?", (QUEUED, RUNNING))
-        for path in (self.folder / "uploads").iterdir():  # and the folders in which they were looked at
+        for path in (self.folder / "uploads").iterdir():  # and the folders in which they were checked
             _remove(path)
         queued = {row[0] for row in self._db.execute("SELECT key FROM works WHERE state=?", (QUEUED,))}
         for path in (self.folder / "work").iterdir():
-            if path.name not in queued:  # what is queued may go on from the state in its folder
+            if path.name not in queued:  # a queued work may resume from the state in its folder
                 _remove(path)
         known = {row[0] for row in self._db.execute("SELECT key FROM works WHERE state=?", (DONE,))}
         for path in (self.folder / "results").iterdir():
             if path.name not in known:
                 _remove(path)
-        for key in known:  # somebody deleted a folder by hand
+        for key in known:  # a folder was deleted by hand
             if not self.result_folder(key).is_dir():
                 self._db.execute("DELETE FROM works WHERE key=?", (key,))
         inputs = {row[0] for row in self._db.execute("SELECT id FROM inputs")}
@@ -129,7 +129,7 @@ class Store:
         return self.folder / "uploads" / secrets.token_hex(16)
 
     def add_input(self, upload: Path, input_id: str, facts: dict) -> None:
-        """Takes a finished upload over. Its name is the hash of its content, so it replaces only its equal."""
+        """Stores a finished upload under the hash of its content, so it replaces only an equal file."""
         size = upload.stat().st_size
         os.replace(upload, self.input_path(input_id))
         self._db.execute(
@@ -156,7 +156,7 @@ class Store:
         return self._db.execute("SELECT * FROM works WHERE key=?", (key,)).fetchone()
 
     def next_work(self) -> sqlite3.Row | None:
-        """The one that has waited longest, which is running from now on."""
+        """Takes the work that has waited longest and marks it as running."""
         row = self._db.execute(
             "UPDATE works SET state=?, started=?, attempts=attempts+1 WHERE key="
             "(SELECT key FROM works WHERE state=? ORDER BY created, rowid LIMIT 1) RETURNING *",
@@ -165,14 +165,14 @@ class Store:
         return row[0] if row else None
 
     def requeue(self, key: str, *, again: bool = False) -> None:
-        """Puts back what was interrupted; the attempt does not count, unless it is tried `again` after a failure."""
+        """Queues an interrupted work again. The attempt does not count, unless it is retried (`again`) after a failure."""
         self._db.execute(
             "UPDATE works SET state=?, started=NULL, attempts=attempts-? WHERE key=? AND state=?",
             (QUEUED, 0 if again else 1, key, RUNNING),
         )
 
     def finish(self, key: str, report: dict) -> None:
-        """The result moves from the work's folder to its place, whole."""
+        """Moves the result from the work's folder to its place, as a whole."""
         work, result = self.work_folder(key), self.result_folder(key)
         if result.exists():
             shutil.rmtree(result)
@@ -192,7 +192,7 @@ class Store:
         )
 
     def measure(self, key: str) -> None:
-        """After a file was added to a result."""
+        """Updates the size after a file was added to a result."""
         self._db.execute("UPDATE works SET bytes=? WHERE key=?", (_size(self.result_folder(key)), key))
 
     def touch(self, key: str) -> None:
@@ -202,7 +202,7 @@ class Store:
         return self._db.execute("SELECT count(*) FROM works WHERE state=?", (state,)).fetchone()[0]
 
     def position(self, work: sqlite3.Row) -> int:
-        """Works that are taken before this one, and it."""
+        """Number of works in the queue up to this one."""
         return self._db.execute(
             "SELECT count(*) FROM works WHERE state=? AND (created, key) <= (?, ?)",
             (QUEUED, work["created"], work["key"]),
@@ -211,7 +211,7 @@ class Store:
     # Jobs
 
     def add_job(self, kind: str, options: str, input_id: str, cameras: str | None, fingerprint: str, name: str) -> str:
-        """A wish; a work for it unless there is one that waits, runs or is done. Its id."""
+        """Adds a job, and a work for it unless one is waiting, running or done. Returns the job's id."""
         text = "\n".join((fingerprint, kind, options, input_id, cameras or ""))
         key = hashlib.sha256(text.encode()).hexdigest()
         now = self._now()
@@ -222,7 +222,7 @@ class Store:
                 "ON CONFLICT (key) DO UPDATE SET used=excluded.used",
                 (key, kind, options, input_id, cameras, QUEUED, now, now),
             )
-            # What failed may succeed now: with more memory, on an emptier disk.
+            # A failed work may succeed now, with more memory or disk space.
             self._db.execute(
                 "UPDATE works SET state=?, created=?, attempts=0, started=NULL, finished=NULL, error=NULL, error_code=NULL "
                 "WHERE key=? AND state IN (?,?)",
@@ -235,7 +235,7 @@ class Store:
         return self._db.execute("SELECT * FROM jobs WHERE id=?", (job_id,)).fetchone()
 
     def cancel_job(self, job_id: str, key: str) -> bool:
-        """True where nobody else waits for the work, so that it is to be ended too."""
+        """Cancels the job. True if no other job waits for its work, which can then be stopped."""
         self._db.execute("UPDATE jobs SET cancelled=1 WHERE id=?", (job_id,))
         return not self.is_wanted(key)
 
@@ -245,7 +245,7 @@ class Store:
         )
 
     def forget_job(self, job_id: str, key: str) -> None:
-        """And its result, where no other job has it."""
+        """Deletes the job, and its result if no other job has it."""
         self._db.execute("DELETE FROM jobs WHERE id=?", (job_id,))
         work = self.work(key)
         if (
@@ -256,10 +256,10 @@ class Store:
             self._forget_work(key)
         self._forget_inputs(older_than=self._now() - 60)
 
-    # What goes
+    # Cleaning up
 
     def sweep(self, keep_days: float, keep_bytes: int, busy: Callable[[str], bool] = lambda key: False) -> int:
-        """Deletes what nobody asked for in so many days, then the longest unused until the rest fits. How many works."""
+        """Deletes what was unused for so many days, then the longest unused until the rest fits. Returns the number of works."""
         before = self._now() - keep_days * 86400
         gone = 0
         rows = self._db.execute(f"SELECT key, used FROM works WHERE state IN {ENDED} ORDER BY used").fetchall()
@@ -285,7 +285,7 @@ class Store:
         shutil.rmtree(self.result_folder(key), ignore_errors=True)
 
     def _forget_inputs(self, older_than: float) -> None:
-        """Those of no work. A minute is left between an upload and its job."""
+        """Deletes uploads without a work that were last used before `older_than`."""
         unused = "SELECT id FROM inputs WHERE used < ? AND id NOT IN (SELECT input FROM works) AND id NOT IN (SELECT cameras FROM works WHERE cameras IS NOT NULL)"
         for (input_id,) in self._db.execute(unused, (older_than,)).fetchall():
             self._db.execute("DELETE FROM inputs WHERE id=?", (input_id,))

@@ -34,7 +34,7 @@ class BadUpload(Exception):
 @dataclass
 class Upload:
     path: Path
-    name: str = ""  # as the client calls it; never a path
+    name: str = ""  # the client's name for it; never a path
     size: int = 0
     sha256: str = ""
     fields: list[tuple[str, str]] = field(default_factory=list)
@@ -42,13 +42,13 @@ class Upload:
 
 
 def plain_name(name: str) -> str:
-    """The last part, without what could command a terminal or break a header."""
+    """The last part of the path, without terminal controls and characters that break headers."""
     last = re.split(r"[/\\]", name)[-1]
     return "".join(c for c in last if c.isprintable())[:120].strip(" .") or "splat"
 
 
 class _Sink:
-    """Bytes of the splat on their way to disk: gathered here, written and hashed in a thread."""
+    """Buffers bytes of the splat; a thread writes and hashes them."""
 
     def __init__(self, path: Path, limit: int):
         self._file = open(path, "xb", opener=lambda name, flags: os.open(name, flags, 0o600))
@@ -60,7 +60,7 @@ class _Sink:
     def add(self, data: bytes) -> None:
         self.bytes += len(data)
         if self.bytes > self._limit:
-            raise BadUpload(413, "too_large", f"The file is larger than this service takes ({self._limit:,} bytes).")
+            raise BadUpload(413, "too_large", f"The file is larger than this service accepts ({self._limit:,} bytes).")
         self._held += data
 
     async def flush(self, least: int) -> None:
@@ -82,7 +82,7 @@ class _Sink:
 
 
 class _Form:
-    """A multipart body, part by part, as its bytes come in."""
+    """Parses a multipart body as its bytes arrive."""
 
     def __init__(self, boundary: bytes, upload: Upload, sink: _Sink):
         self._upload, self._sink = upload, sink
@@ -156,7 +156,7 @@ class _Form:
 
 
 async def receive(request: Request, path: Path, limit: int, stall_seconds: float) -> Upload:
-    """Writes the splat to `path`, which is new. Raises BadUpload; the caller removes what is there then."""
+    """Writes the splat to the new file `path`. Raises BadUpload; the caller then removes the file."""
     _refuse_announced(request, limit)
     upload = Upload(path, plain_name(request.query_params.get("name", "")))
     sink = _Sink(path, limit)
@@ -176,7 +176,7 @@ async def receive(request: Request, path: Path, limit: int, stall_seconds: float
         if form is not None:
             form.parser.finalize()
             if not form.ended:
-                raise BadUpload(400, "bad_request", "The form ends in the middle.")
+                raise BadUpload(400, "bad_request", "The form is incomplete.")
             if not form.has_file:
                 raise BadUpload(400, "bad_request", "The form has no 'file'.")
         if sink.bytes == 0:
@@ -186,7 +186,7 @@ async def receive(request: Request, path: Path, limit: int, stall_seconds: float
     except FormParserError as error:
         raise BadUpload(400, "bad_request", f"The form is malformed: {plain_name(str(error))}") from None
     except ClientDisconnect:
-        raise BadUpload(400, "bad_request", "The upload ended in the middle.") from None
+        raise BadUpload(400, "bad_request", "The upload is incomplete.") from None
     finally:
         sink.close()
 
@@ -194,7 +194,7 @@ async def receive(request: Request, path: Path, limit: int, stall_seconds: float
 def _refuse_announced(request: Request, limit: int) -> None:
     announced = request.headers.get("content-length", "0")
     if announced.isascii() and announced.isdigit() and int(announced) > limit + MOST_CAMERA_BYTES + _FLUSH_BYTES:
-        raise BadUpload(413, "too_large", f"The file is larger than this service takes ({limit:,} bytes).")
+        raise BadUpload(413, "too_large", f"The file is larger than this service accepts ({limit:,} bytes).")
 
 
 async def _chunks(request: Request, stall_seconds: float):
@@ -213,7 +213,7 @@ async def _chunks(request: Request, stall_seconds: float):
 
 
 async def drain(request: Request) -> None:
-    """Reads what is left of a small body, so that the client hears the answer and not a broken connection."""
+    """Reads the rest of a small body, so that the client gets the answer instead of a broken connection."""
     received = 0
     announced = request.headers.get("content-length", "0")
     if not announced.isdigit() or int(announced) > _DRAIN_BYTES:
@@ -223,5 +223,5 @@ async def drain(request: Request) -> None:
             received += len(chunk)
             if received > _DRAIN_BYTES:
                 return
-    except (BadUpload, ClientDisconnect, RuntimeError):  # RuntimeError: it was read already
+    except (BadUpload, ClientDisconnect, RuntimeError):  # RuntimeError: already read
         pass

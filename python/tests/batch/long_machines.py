@@ -81,7 +81,7 @@ def test_a_signal_stops_cleanly_and_it_goes_on(
     wait_for(control.folder / "held-c.ply", process)
     process.send_signal(number)
     code, out, err = finish(process)
-    assert code == 130 and "2 still to do" in out and "interrupted; the same command goes on from here" in err
+    assert code == 130 and "2 still to do" in out and "interrupted; run the same command to continue" in err
     assert not (tmp_path / "out/.batch").exists()
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["a.ply", "b.ply", "manifest.jsonl"]
     held.unlink()
@@ -136,7 +136,7 @@ def test_s3(control: Control, s3: fsspec.AbstractFileSystem, scans: Path, tmp_pa
     words = ["enhance", "s3://scans/**/*.ply", "-o", "s3://sharp/x4", "--method", "filter", "--format", "spz"]
     code, out, err = finish(command_line(*words))
     assert code == 1 and "4 enhanced, 0 there already, 1 failed" in out, err
-    assert "s3://scans/day/e.ply: byte 0: is no PLY file" in err
+    assert "s3://scans/day/e.ply: byte 0: is not a PLY file" in err
     by_hand = enhanced_by_hand(native, scans / "b.ply", tmp_path / "b.spz", "--method=filter")
     assert s3.cat_file("sharp/x4/day/b.spz") == by_hand
     assert sorted(s3.find("sharp/x4/day")) == [f"sharp/x4/day/{name}.spz" for name in "abcd"]

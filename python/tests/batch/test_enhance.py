@@ -76,7 +76,7 @@ def test_a_bad_file_is_a_row(control: Control, scans: Path, tmp_path: Path, capf
     said = capfd.readouterr()
     assert code == 1
     assert "5 splats: 3 enhanced, 0 there already, 2 failed" in said.out
-    assert f"error: {scans}/b.ply: byte 0: is no PLY file" in said.err
+    assert f"error: {scans}/b.ply: byte 0: is not a PLY file" in said.err
     assert f"error: {scans}/gone.ply: no such file" in said.err
     failed = {row["output"]: row["error"]["code"] for row in rows(tmp_path / "out/manifest.jsonl") if row["state"] == "failed"}
     assert failed == {"b.ply": "bad_file", "gone.ply": "not_found"}
@@ -186,7 +186,7 @@ def test_interrupted_it_goes_on_where_it_was(control: Control, scans: Path, tmp_
 def test_files_of_others_are_not_replaced(control: Control, scans: Path, tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out/b.ply").write_text("mine")
-    with pytest.raises(ExistsError, match=r"out/b\.ply: there already, and not made by a batch"):
+    with pytest.raises(ExistsError, match=r"out/b\.ply: exists, but was not made by a batch"):
         batch.enhance(f"{scans}/*.ply", tmp_path / "out", method="filter")
     assert control.calls() == [] and (tmp_path / "out/b.ply").read_text() == "mine"
     with pytest.raises(BadArgumentError, match="its result would replace it"):
@@ -242,7 +242,7 @@ def test_what_makes_no_sense_is_said_before_any_work(control: Control, scans: Pa
     refused("output: enhance has no such option for batches", output="x.ply")
     refused("clean='yes': expected True or False", clean="yes")
     refused("--format gltf", format="gltf")
-    refused("--threads 0: at least 1", threads=0)
+    refused("--threads 0: must be at least 1", threads=0)
     refused("no machine here has more than 2 cores", threads=64)
     refused("ray job submit", ray="ray://127.0.0.1:1")
     assert control.calls() == [] and not list((tmp_path / "out").glob("*.ply"))

@@ -87,5 +87,5 @@ def test_urls_have_identities_and_names(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["memory://bucket/..", "memory://bucket/.ply"])
 def test_names_that_lead_elsewhere_are_refused(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("anchorsplat.batch.storage.stat_many", lambda uris: dict.fromkeys(uris))
-    with pytest.raises(BadArgumentError, match="no name for a result"):
+    with pytest.raises(BadArgumentError, match="no valid name for the result"):
         names(name)

@@ -72,7 +72,7 @@ def test_a_line_cut_short_counts_as_not_written(tmp_path: Path) -> None:
 def test_one_batch_at_a_time(tmp_path: Path) -> None:
     path = str(tmp_path / "manifest.jsonl")
     first = Manifest(path)
-    with pytest.raises(ExistsError, match="another batch is at work"):
+    with pytest.raises(ExistsError, match="another batch uses it"):
         Manifest(path)
     first.close()
     Manifest(path).close()
@@ -82,7 +82,7 @@ def test_what_is_no_manifest_is_refused_and_left_alone(tmp_path: Path) -> None:
     path = tmp_path / "notes.txt"
     for text in ("buy milk\n", "[]\n", '{"state": "done"}\n', '{"same": "never", "identity": ""}\n'):
         path.write_text(text)
-        with pytest.raises(BadFileError, match=r"notes\.txt: line 1: is no line of a batch's manifest"):
+        with pytest.raises(BadFileError, match=r"notes\.txt: line 1: is not a line of a batch manifest"):
             Manifest(str(path))
         assert path.read_text() == text
 

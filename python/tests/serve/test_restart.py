@@ -95,7 +95,7 @@ def test_two_services_in_one_folder(serve, tmp_path) -> None:
         text=True,
         timeout=120,
     )
-    assert second.returncode == 6 and "another 'anchorsplat serve' works in this folder" in second.stderr
+    assert second.returncode == 6 and "another 'anchorsplat serve' uses this folder" in second.stderr
 
 
 def test_a_port_that_is_taken(serve, tmp_path) -> None:
@@ -117,4 +117,4 @@ def test_a_port_that_is_taken(serve, tmp_path) -> None:
         text=True,
         timeout=120,
     )
-    assert second.returncode == 6 and "--port takes another" in second.stderr
+    assert second.returncode == 6 and "pass another --port" in second.stderr

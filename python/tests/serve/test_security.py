@@ -200,7 +200,7 @@ def test_a_proxy(serve) -> None:
         (["--allow-host", "splats.example.org"], "needs a token"),
         (["--token", "short"], "at least 16"),
         (["--token", ""], "at least 16"),
-        (["--max-upload", "many"], "no size"),
+        (["--max-upload", "many"], "not a size"),
         (["--max-upload", "0"], "at least one byte"),
         (["--port", "70000"], "65,535"),
         (["--max-seconds", "nan"], "must be from"),

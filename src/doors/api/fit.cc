@@ -46,12 +46,12 @@ FitQuality ToQuality(const ViewQuality& quality) { return {quality.views, qualit
 Result<FitOutcome> FitTo(const std::filesystem::path& project, const GaussianCloud* start,
                          const FitSettings& settings) {
   if (settings.sh_degree < 0 || settings.sh_degree > kMaxShDegree) {
-    return Error{ErrorCode::kBadArgument, "the SH degree of a fit is 0 to 3"};
+    return Error{ErrorCode::kBadArgument, "the SH degree of a fit must be 0 to 3"};
   }
   if (settings.steps < 1 || settings.max_gaussians < 0 || settings.hold_out < 0 ||
       settings.initial_points.value_or(1) < 1) {
     return Error{ErrorCode::kBadArgument,
-                 "a fit has at least one step and one Gaussian; max_gaussians and hold_out are not negative"};
+                 "a fit needs at least one step and one Gaussian; max_gaussians and hold_out must not be negative"};
   }
   if (const auto extent = settings.initial_extent) {
     if (!(*extent >= 1e-3 && *extent <= 1e3)) {
@@ -62,7 +62,7 @@ Result<FitOutcome> FitTo(const std::filesystem::path& project, const GaussianClo
     }
   }
   if (settings.downscale < 1 || settings.downscale > kMaxDownscale) {
-    return Error{ErrorCode::kBadArgument, Cat("the downscale of a fit is 1 to ", kMaxDownscale)};
+    return Error{ErrorCode::kBadArgument, Cat("the downscale of a fit must be 1 to ", kMaxDownscale)};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views,
                                OpenProject(project, {.hold_out = settings.hold_out, .downscale = settings.downscale}));

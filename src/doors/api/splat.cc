@@ -18,9 +18,9 @@ Splat::Splat(std::unique_ptr<Owned> owned) : owned_(std::move(owned)) {}
 
 Expected<Splat> Splat::OfSize(int64_t count, int sh_degree) {
   return InRun<Splat>({}, [&]() -> Result<Splat> {
-    constexpr int64_t kMost = int64_t{1} << 31;  // that anything here can count
+    constexpr int64_t kMost = int64_t{1} << 31;  // limit of the engine
     if (count < 0 || count > kMost || sh_degree < 0 || sh_degree > kMaxShDegree) {
-      return Error{ErrorCode::kBadArgument, "a splat has 0 to 2^31 Gaussians of SH degree 0 to 3"};
+      return Error{ErrorCode::kBadArgument, "a splat must have 0 to 2^31 Gaussians of SH degree 0 to 3"};
     }
     GaussianCloud cloud;
     cloud.Resize(count, sh_degree);

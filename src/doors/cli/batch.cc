@@ -22,7 +22,7 @@ Status RunBatch(const std::vector<BatchItem>& items, const std::function<Result<
     if (items.size() == 1 || error.code == ErrorCode::kInterrupted) return error;
     if (error.message.find(item.input) == std::string::npos) error.message = Cat(item.input, ": ", error.message);
     if (++failed == items.size()) {
-      return Error{error.code, Cat("all ", failed, " inputs failed, the last with: ", error.message)};
+      return Error{error.code, Cat("all ", failed, " inputs failed. The last error: ", error.message)};
     }
     LogError(error.message);
     rows.push_back({{"input", item.input},

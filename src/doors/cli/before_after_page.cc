@@ -16,9 +16,8 @@ namespace fs = std::filesystem;
 constexpr double kSure = 0.85;
 
 constexpr const char* kSmaller =
-    "enhance without --view and let `anchorsplat view` write one of any size with --folder, or a smaller one, of the "
-    "result "
-    "alone or with --sh-degree 0";
+    "enhance without --view, then run `anchorsplat view`: with --folder for any size, or smaller with --sh-degree 0 or "
+    "without --before";
 
 }  // namespace
 
@@ -31,7 +30,7 @@ Status CheckPages(std::span<const fs::path> outputs) {
     if (!fresh) {
       return Error{ErrorCode::kBadArgument,
                    Cat("--view: the pages of ", other->second.string(), " and ", output.string(), " would both be ",
-                       PagePath(output).string(), ": enhance them one after the other into different folders")};
+                       PagePath(output).string(), ": enhance them separately, into different folders")};
     }
   }
   return {};
@@ -44,9 +43,9 @@ Status CheckPageFits(const fs::path& output, const GaussianCloud& before, const 
   if (both * MostPageBytes(before.sh_degree) <= kLimit) return {};
   const double bytes = both / n * static_cast<double>(EstimatedPageBytes(before));
   if (kSure * bytes <= kLimit) return {};
-  return Error{ErrorCode::kBadArgument, Cat(PagePath(output).string(), ": the page of --view would take about ",
+  return Error{ErrorCode::kBadArgument, Cat(PagePath(output).string(), ": the page of --view would have about ",
                                             HumanBytes(static_cast<uint64_t>(bytes)), ", more than the ",
-                                            HumanBytes(kMaxPageBytes), " a browser opens well; ", kSmaller)};
+                                            HumanBytes(kMaxPageBytes), " that browsers open well; ", kSmaller)};
 }
 
 Status WritePage(const fs::path& input, const GaussianCloud& before, const fs::path& output, const Enhanced& enhanced,
@@ -61,7 +60,8 @@ Status WritePage(const fs::path& input, const GaussianCloud& before, const fs::p
   page.smaller = kSmaller;
   const Status written = WriteViewerPage(PagePath(output), page, options);
   if (written.ok()) return {};
-  return Error{written.error().code, Cat(output.string(), " was written, but not its page: ", written.error().message)};
+  return Error{written.error().code,
+               Cat(output.string(), " is written, but its page is not: ", written.error().message)};
 }
 
 }  // namespace anchorsplat

@@ -14,6 +14,7 @@
 #include "cli/table.h"
 #include "cli/verb.h"
 #include "compare/view_source.h"
+#include "core/log.h"
 #include "core/text.h"
 #include "images/image_io.h"
 #include "io/atomic_file.h"
@@ -86,7 +87,7 @@ void PrintTable(const CompareWords& flags, const std::vector<Comparison>& result
   std::cout << FormatTable(rows);
 }
 
-// The view whose score is the middle one: neither the best nor the worst picture to show.
+// The view with the median score, as an example that is neither the best nor the worst.
 size_t MedianView(const Comparison& comparison) {
   std::vector<size_t> order(comparison.views.size());
   std::iota(order.begin(), order.end(), size_t{0});
@@ -95,7 +96,7 @@ size_t MedianView(const Comparison& comparison) {
   return order[order.size() / 2];
 }
 
-// The last two parts of a path: "biplane/input.ply" says more than "input.ply".
+// The last two parts of a path, such as "biplane/input.ply".
 std::string ShortName(const fs::path& path) {
   const fs::path parent =
       path.has_filename() ? path.parent_path().filename() : path.parent_path().parent_path().filename();
@@ -162,6 +163,11 @@ Status RunCompare(const CompareWords& flags, const SharedFlags& shared) {
     PrintJson(json);
   } else {
     PrintTable(flags, results);
+    if (flags.truth.empty() && !LooksLikeImages(flags.b)) {
+      LogInfo(
+          "PSNR and SSIM show here how alike A and B are, not which is better. To measure quality, pass ground "
+          "truth with --truth");
+    }
   }
   return {};
 }
@@ -174,13 +180,16 @@ void AddCompare(CLI::App& app, Program& program) {
               "anchorsplat compare before.ply after.ply --truth photos/ --cameras transforms.json");
   const auto flags = std::make_shared<CompareWords>();
   verb.add_option("a", flags->a, "Splat, folder of pictures or picture")->required()->check(NotEmpty());
-  verb.add_option("b", flags->b, "The same; the reference for A, unless --truth is given")
+  verb.add_option("b", flags->b, "The same kinds; the reference for A, unless --truth is given")
       ->required()
       ->check(NotEmpty());
-  verb.add_option("--truth", flags->truth, "Ground truth: compare both A and B with this, and show the gain")
+  verb.add_option("--truth", flags->truth,
+                  "Ground truth (splat or pictures): measure A and B against it, and the gain of B over A")
+      ->type_name("PATH")
       ->check(NotEmpty());
   verb.add_option("--side-by-side", flags->side_by_side,
                   "PNG of the view with the median score: pictures, zoomed crop, difference")
+      ->type_name("FILE")
       ->check(NotEmpty());
   AddLpipsFlags(verb, flags->lpips, flags->lpips_weights);
   flags->how.AddTo(verb);

@@ -57,7 +57,8 @@ std::string ZshText(const std::string& text) {
 std::string ZshValue(const DeclaredOption& option, const std::string& name) {
   if (!option.choices.empty()) return ":" + name + ":(" + ZshText(Joined(option.choices)) + ")";
   if (option.value.empty()) return "";
-  return ":" + name + (option.value == "TEXT" ? ":_files" : ":");
+  if (option.value == "FOLDER") return ":" + name + ":_files -/";
+  return ":" + name + (option.value == "FILE" || option.value == "PATH" ? ":_files" : ":");
 }
 
 std::string ZshFunction(const DeclaredVerb& verb) { return "_anchorsplat_" + verb.name("_"); }

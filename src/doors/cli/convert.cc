@@ -48,11 +48,11 @@ struct ConvertWords {
   bool lod = false;
   ConvertFlags how;
   SizeFlags size;
-  const StandardOutput* piped = nullptr;  // the one output goes there
+  const StandardOutput* piped = nullptr;  // destination of the single output
 };
 
-// "scan.compressed.ply" without the extension of its format; "scan/meta.json", or "scan" where that is in it, is the
-// folder's name.
+// "scan.compressed.ply" without its extension; the folder's name for "scan/meta.json", or for a "scan" that contains
+// it.
 std::string Stem(const fs::path& input) {
   const fs::path found = SplatPath(input);
   if ((found.filename() == "meta.json" || found.filename() == "lod-meta.json") && found.has_parent_path()) {
@@ -81,15 +81,15 @@ std::string WrittenFormats() {
 struct Job {
   std::vector<fs::path> inputs;
   fs::path output;
-  size_t output_at = 0;    // among the paths, from 1; 0: it is none of them
-  bool has_output = true;  // else `output` only says what would be written
+  size_t output_at = 0;    // among the paths, from 1; 0: not among them
+  bool has_output = true;  // else `output` is only for the report
 };
 
 Result<std::vector<Job>> Jobs(const ConvertWords& flags, bool overwrite) {
   std::vector<Job> jobs;
   if (flags.out_dir.empty()) {
     const size_t count = flags.paths.size();
-    if (count < 2 && flags.how.edits.dry_run) {  // nothing is written, so that no name is needed
+    if (count < 2 && flags.how.edits.dry_run) {  // nothing is written, so no output is needed
       jobs.push_back({.inputs = {flags.paths[0]}, .output = "dry-run.ply", .has_output = false});
       return jobs;
     }
@@ -98,7 +98,7 @@ Result<std::vector<Job>> Jobs(const ConvertWords& flags, bool overwrite) {
                     flags.piped != nullptr ? flags.piped->path() : fs::path(flags.paths.back()),
                     count});
     if (!flags.lod) return jobs;
-    // The folder of a scene, as it is or will be ("scene.v2" is one), stands for the file that programs look for in it.
+    // A folder ("scene.v2" is one) stands for its lod-meta.json.
     fs::path& output = jobs.back().output;
     if (IsFolder(output) || FormatOfExtension(output) == nullptr) output /= kStreamedName;
     if (output.filename() == kStreamedName) return jobs;
@@ -106,7 +106,7 @@ Result<std::vector<Job>> Jobs(const ConvertWords& flags, bool overwrite) {
                  Cat("--lod needs a folder, or lod-meta.json in one, as OUT, not ", output.string())};
   }
   ANCHORSPLAT_RETURN_IF_ERROR(CheckOutDir(flags.out_dir));
-  // Folders of pictures get one folder each; ".spz" may be said without its dot. A slash would lead out of --out-dir.
+  // SOG gets one folder each; the dot of ".spz" is optional. A slash would lead out of --out-dir.
   const bool folders = flags.lod || flags.to == "meta.json" || flags.to == kStreamedName;
   const std::string extension = flags.lod                   ? Cat("/", kStreamedName)
                                 : folders                   ? "/" + flags.to
@@ -123,7 +123,7 @@ Result<std::vector<Job>> Jobs(const ConvertWords& flags, bool overwrite) {
     inputs.emplace_back(input);
     outputs.push_back(fs::path(flags.out_dir) / (Stem(input) + extension));
   }
-  // Those that are read later are inputs already when the first output is written.
+  // All inputs must be recorded before the first output is written.
   for (const fs::path& input : inputs) RecordSplat(input);
   std::map<fs::path, std::string> taken;
   for (size_t k = 0; k < inputs.size(); ++k) {
@@ -134,7 +134,7 @@ Result<std::vector<Job>> Jobs(const ConvertWords& flags, bool overwrite) {
       return Error{ErrorCode::kBadArgument,
                    Cat(other->second, " and ", input, " would both become ", output.string(), ": rename one")};
     }
-    // Checked for all before the first is read: a batch should not fail half-way on something known at its start.
+    // Checks all before reading the first, so that a batch does not fail half-way.
     for (const fs::path& file : FilesOfCloud(output, kMaxShDegree)) ANCHORSPLAT_RETURN_IF_ERROR(CheckNotInput(file));
     if (!overwrite && !flags.how.edits.dry_run && Exists(output)) {
       return Error{ErrorCode::kExists, Cat(output.string(), " exists; -w replaces it")};
@@ -147,7 +147,7 @@ Result<std::vector<Job>> Jobs(const ConvertWords& flags, bool overwrite) {
     fs::create_directories(job.output.parent_path(), code);
     if (code) {
       return Error{ErrorCode::kIo,
-                   Cat(job.output.parent_path().string(), ": cannot make this folder: ", code.message())};
+                   Cat(job.output.parent_path().string(), ": cannot create this folder: ", code.message())};
     }
   }
   return jobs;
@@ -191,7 +191,7 @@ void Print(const OutputMemory* piped, const Job& job, const Converted& done) {
   }
 }
 
-// A network's weights, which only become .safetensors.
+// Network weights become .safetensors only.
 Status ConvertModel(const ConvertWords& flags, const SharedFlags& shared) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto edits, ActionsAmongPaths(flags.how.edits));
   if (flags.how.edits.dry_run || std::ranges::any_of(edits, [](const auto& actions) { return !actions.empty(); })) {
@@ -212,7 +212,7 @@ Status ConvertModel(const ConvertWords& flags, const SharedFlags& shared) {
   return {};
 }
 
-// What will come out, as far as the header tells.
+// Predicted output, from the header.
 std::optional<OutputPlan> PlanOf(const ConvertOptions& options, const Job& job) {
   const SplatFormat* const to = FormatOfExtension(job.output);
   if (to == nullptr || to->predicted_size == nullptr) return std::nullopt;
@@ -233,7 +233,7 @@ std::optional<OutputPlan> PlanOf(const ConvertOptions& options, const Job& job) 
   return plan;
 }
 
-// One file: converted, measured where asked for, told. A row of the JSON document.
+// Converts, measures and reports one file. Returns its row of the JSON document.
 Result<nlohmann::json> RunJob(const Job& job, const EditJob& edits, int views, const SharedFlags& shared) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Converted done, ConvertAndMeasure(edits, job.output, views));
   if (!shared.json && (!shared.quiet || done.dry_run)) Print(edits.convert.write.memory, job, done);
@@ -273,7 +273,7 @@ Status RunJobs(const ConvertWords& flags, Program& program) {
   const StopSignal stop_signal(StopSignal::Leaves::kNothing);
   const auto run = [&](size_t k) {
     fs::path folder = jobs[k].output.parent_path();
-    if (!folder.empty() && !IsFolder(folder)) folder = folder.parent_path();  // it is made with the output
+    if (!folder.empty() && !IsFolder(folder)) folder = folder.parent_path();  // created with the output
     const MemoryLimit limit(flags.size.arrays(), folder);
     return RunJob(jobs[k], edits[k], flags.how.views, shared);
   };
@@ -309,11 +309,13 @@ void AddConvert(CLI::App& app, Program& program) {
                           "input or output. Writes ",
                           WrittenFormats(), ", and a network's weights as .safetensors"))
           ->required();
-  verb.add_option("--out-dir", flags->out_dir, "Output folder; files keep the names of the inputs");
+  verb.add_option("--out-dir", flags->out_dir, "Output folder; files keep the names of the inputs")
+      ->type_name("FOLDER");
   flags->to_option =
       verb.add_option("--to", flags->to,
                       "Format of files in --out-dir or of standard output, by extension; meta.json and lod-meta.json "
                       "make a folder each")
+          ->type_name("FORMAT")
           ->capture_default_str();
   verb.add_flag(
       "--lod", flags->lod,

@@ -126,7 +126,7 @@ TEST_F(ConvertVerb, MaxMemoryIsASize) {
 
 TEST_F(ConvertVerb, SaysWhatIsLost) {
   const ProgramRun dull = ExpectDone({"convert", scan_, folder_ / "dull.splat"});
-  EXPECT_THAT(dull.err, HasSubstr("harmonics beyond degree 0"));
+  EXPECT_THAT(dull.err, HasSubstr("harmonics above degree 0"));
   EXPECT_THAT(dull.out, HasSubstr("of degree 0 out"));
   WriteNanScan(folder_ / "nan.ply");
   EXPECT_THAT(ExpectDone({"convert", folder_ / "nan.ply", folder_ / "nan.csv"}).err,
@@ -253,7 +253,7 @@ TEST_F(ConvertVerb, KeepsWhatAPlySaysBesideItsGaussians) {
   EXPECT_TRUE(has_labels("kept.ply"));
   EXPECT_THAT(ExpectDone({"info", folder_ / "kept.ply"}).out, HasSubstr("other properties  nx ny nz label"));
   EXPECT_THAT(ExpectDone({"convert", extras, folder_ / "lost.spz"}).err,
-              HasSubstr("other properties of the input are dropped: label, normals"));
+              HasSubstr("extra properties of the input dropped: label, normals"));
   // So does the filter, which leaves the Gaussians; those of a network are others.
   EXPECT_THAT(ExpectDone({"enhance", extras, "-o", folder_ / "filtered.ply", "--method", "filter", "--pixel-size",
                           "0.1", "--mode", "classic"})

@@ -26,7 +26,7 @@ namespace anchorsplat {
 
 namespace {
 
-// The kernel's files say that they are empty, so that io/'s readers would take them for that.
+// Files of the kernel have size 0, so the readers in io/ would see them as empty.
 std::string ProcessorName() {
   std::ifstream file("/proc/cpuinfo");
   for (std::string line; std::getline(file, line);) {
@@ -36,7 +36,7 @@ std::string ProcessorName() {
   return "unknown processor";
 }
 
-// Bytes by /proc/meminfo, 0 where it does not say.
+// Bytes from /proc/meminfo; 0 if unknown.
 uint64_t MemoryOf(const std::string& what) {
   std::ifstream file("/proc/meminfo");
   for (std::string line; std::getline(file, line);) {
@@ -45,7 +45,7 @@ uint64_t MemoryOf(const std::string& what) {
   return 0;
 }
 
-// What a container may use; nothing where it is not limited.
+// Memory limit of the container; unset if there is none.
 std::optional<uint64_t> MemoryOfContainer() {
   const uint64_t most = MachineMemory();
   return most < MemoryOf("MemTotal") ? std::optional(most) : std::nullopt;
@@ -54,7 +54,7 @@ std::optional<uint64_t> MemoryOfContainer() {
 struct Machine {
   std::string processor = ProcessorName();
   std::string simd;                 // in use
-  std::vector<std::string> lesser;  // what else this program has and this machine could run
+  std::vector<std::string> lesser;  // others in this program that this machine can run
   bool bfloat16_products = UsesBFloat16Dot();
   int threads = ThreadCount();
   uint64_t memory = MemoryOf("MemTotal");
@@ -91,7 +91,7 @@ Finding FindModel() {
     if (!network.ok()) return {"model", kBroken, network.error().message, "make build"};
     copies = std::max(copies, network->config().copies);
   }
-  return {"model", kReady, Cat("in the program, ", copies, " Gaussians for one"), ""};
+  return {"model", kReady, Cat("built in, ", copies, " Gaussians for each"), ""};
 }
 
 Finding FindGpu(const GpuFindings& gpus) {
@@ -147,9 +147,8 @@ void PrintReportAsJson(const Machine& machine, const std::vector<Finding>& findi
 }  // namespace
 
 void AddDoctor(CLI::App& app, Program& program) {
-  CLI::App& verb =
-      AddVerb(app, program, "doctor", "Check the program and the machine, and say how to get what is missing",
-              "anchorsplat doctor");
+  CLI::App& verb = AddVerb(app, program, "doctor", "Check this program and machine, and say how to get what is missing",
+                           "anchorsplat doctor");
   verb.callback([&program] {
     program.run = [&program]() -> Status {
       const Machine machine = LookAtMachine();

@@ -44,7 +44,7 @@ TEST(DoctorVerb, EveryPartHasAState) {
   EXPECT_EQ(json["parts"]["GPU"]["state"] == "missing", json["gpu"]["adapters"].empty());
   const ProgramRun run = ExpectDone({"doctor"});
   EXPECT_THAT(run.out, AllOf(HasSubstr("anchorsplat    "), HasSubstr("processor"), HasSubstr("SIMD"),
-                             HasSubstr("in the program, 4 Gaussians for one"), HasSubstr("fetch-lpips.sh")));
+                             HasSubstr("built in, 4 Gaussians for each"), HasSubstr("fetch-lpips.sh")));
   EXPECT_THAT(run.err, IsEmpty());
 }
 

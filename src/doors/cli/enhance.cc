@@ -53,7 +53,7 @@ struct EnhanceWords {
   bool view = false;
   std::string to = ".ply";
   const CLI::Option* to_option = nullptr;
-  const StandardOutput* piped = nullptr;  // the one output goes there
+  const StandardOutput* piped = nullptr;  // destination of the single output
 
   OutputMemory* memory() const { return piped != nullptr ? piped->memory() : nullptr; }
 };
@@ -61,16 +61,16 @@ struct EnhanceWords {
 // Of neighbours, their frames and the choice of copies, per Gaussian of the input; measured (docs/benchmarks.md).
 constexpr uint64_t kWorkingBytes = 300;
 
-// Arrays that are there at the same time, where `worked` of the Gaussians are worked on.
+// Bytes of arrays that exist at the same time if `worked` Gaussians are enhanced.
 uint64_t NeededBytes(int64_t in, int64_t worked, int64_t out, int sh_degree) {
   const uint64_t own = static_cast<uint64_t>(in) * RowBytes(sh_degree);
   if (out <= in) return own;  // changed in place
   const uint64_t made = static_cast<uint64_t>(out) * RowBytes(sh_degree);
   return std::max(own + static_cast<uint64_t>(worked) * kWorkingBytes + made,
-                  2 * made);  // it is put in order at the end
+                  2 * made);  // reordered at the end
 }
 
-// What can be known to fail before anything is read.
+// Checks that need no input.
 Status CheckOutput(const fs::path& output, const CloudWriteOptions& write) {
   const SplatFormat* format = FormatOfExtension(output);
   if (format == nullptr || format->write == nullptr) {
@@ -83,28 +83,28 @@ Status CheckOutput(const fs::path& output, const CloudWriteOptions& write) {
   return CheckCanWriteCloud(output, 0, write);
 }
 
-// Where a run for this output keeps what it needs to go on after an interruption, and what tells such a file.
+// Checkpoint of a run for this output, and how to recognise one.
 struct Checkpoint {
-  fs::path path;  // empty: nothing is kept
+  fs::path path;  // empty: no checkpoint
   bool (*is_checkpoint)(const fs::path&) = nullptr;
 };
 
 Checkpoint CheckpointOf(const EnhanceWords& flags, const EnhanceOptions& options, const fs::path& output) {
-  if (flags.piped != nullptr && options.control.checkpoint.empty()) return {};  // there is nothing to lie beside
+  if (flags.piped != nullptr && options.control.checkpoint.empty()) return {};  // standard output has no folder
   const auto plan = PlanEnhancement(options);
   if (!plan.ok() || !plan->KeepsCheckpoint(options)) return {};
   return {options.control.checkpoint.empty() ? fs::path(output.string() + ".checkpoint") : options.control.checkpoint,
           plan->method->is_checkpoint};
 }
 
-// All that is written for an output.
+// All files written for an output.
 std::vector<fs::path> OutputFiles(const EnhanceWords& flags, const fs::path& output) {
   std::vector<fs::path> files = FilesOfCloud(output, kMaxShDegree);
   if (flags.view) files.push_back(PagePath(output));
   return files;
 }
 
-// Where each input goes. Nothing may be written twice.
+// Output of each input. No two may be the same.
 Result<std::vector<fs::path>> OutputPaths(const EnhanceWords& flags) {
   if (flags.output.empty() == flags.out_dir.empty()) {
     return Error{ErrorCode::kBadArgument, "no output: pass -o FILE for one input, --out-dir DIR for several"};
@@ -140,8 +140,7 @@ Status MakeOutDir(const EnhanceWords& flags) {
   return {};
 }
 
-// What will come out, where `outside` of the Gaussians lie out of the region. A Gaussian of the output has all
-// harmonics where a network of the published architecture makes it.
+// Predicted size and time. `outside`: number of Gaussians outside the region, which stay unchanged.
 OutputPlan PlanOf(const EnhanceOptions& options, const std::string& input, const fs::path& output,
                   const CloudExtent& extent, int64_t outside = 0) {
   const SplatFormat& to = *FormatOfExtension(output);
@@ -166,17 +165,23 @@ int64_t CountOutside(const std::optional<Region>& region, const GaussianCloud& c
   return outside;
 }
 
-// What the method worked with, where it is the filter's business.
+std::string SourceInWords(PixelSizeSource source) {
+  if (source == PixelSizeSource::kRead) return "estimated";
+  const bool measured = source == PixelSizeSource::kCameras || source == PixelSizeSource::kPictures;
+  return Cat(measured ? "from " : "", NameOf(source));
+}
+
+// What the method worked with; empty if it needs no pixel size.
 std::string Details(const EnhanceReport& r) {
   if (r.pixel_size_source == PixelSizeSource::kNone) return "";
   if (r.pixel_size_source == PixelSizeSource::kUnknown) return ", left unchanged";
   if (r.filter_strength == 0) return IsInvented(r) ? Cat(" ", r.upscale, "x") : ", left unchanged";
-  return Cat(" ", r.upscale, "x, strength ", Fixed(r.filter_strength, 3), ", pixel size ", r.pixel_size, " (",
-             NameOf(r.pixel_size_source), ")");
+  return Cat(" ", r.upscale, "x, filter strength ", Fixed(r.filter_strength, 2), ", pixel size ", r.pixel_size, " (",
+             SourceInWords(r.pixel_size_source), ")");
 }
 
-// Leaves those of `extras` that belong to Gaussians that are enhanced. The means of these Gaussians, by which the
-// result shows whether they are still the same ones; nothing where there is nothing to keep.
+// Removes the extras of unusable Gaussians. Returns the means of the others, to check later whether the Gaussians are
+// still the same; empty if there are no extras.
 Buffer<float> KeepUsable(ExtraProperties& extras, const GaussianCloud& cloud) {
   if (extras.empty()) return {};
   std::vector<char> usable(static_cast<size_t>(cloud.size()));
@@ -187,7 +192,7 @@ Buffer<float> KeepUsable(ExtraProperties& extras, const GaussianCloud& cloud) {
   return means;
 }
 
-// Values that are wrong are those of a file.
+// Bad values came from a file: names it.
 Error Of(const std::string& input, Error error) {
   if (error.code == ErrorCode::kBadFile && error.message.starts_with(kNoneUsable)) {
     error.message = Cat(input, ": ", error.message);
@@ -195,7 +200,7 @@ Error Of(const std::string& input, Error error) {
   return error;
 }
 
-// An interruption says how to go on.
+// After an interruption, adds how to continue.
 Error WithWayOn(Error error, const fs::path& checkpoint) {
   if (error.code == ErrorCode::kInterrupted && !checkpoint.empty() && Exists(checkpoint)) {
     error.message += Cat("; to continue, add --resume, which reads ", checkpoint.string());
@@ -203,8 +208,7 @@ Error WithWayOn(Error error, const fs::path& checkpoint) {
   return error;
 }
 
-// From one file to another; its entry of the results.
-// `said`: what will come out.
+// Enhances one file; returns its row of the results. `said`: the expected output was reported.
 Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& shared, EnhanceOptions options,
                                   const std::string& input, const fs::path& output, bool said) {
   const DeviceUse device;
@@ -213,7 +217,7 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
   ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSplat file, OpenedSplat::Open(input));
   ExtraProperties extras;
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, file.Read({}, &extras));
-  stop_signal.reset();  // a question is asked of who can end it
+  stop_signal.reset();  // so that Ctrl-C ends the question
   if (!said) {
     const OutputPlan plan =
         PlanOf(options, input, output, {cloud.size(), cloud.sh_degree}, CountOutside(options.region, cloud));
@@ -226,7 +230,7 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
     before = cloud;
   }
   const CloudWriteOptions write{.overwrite = shared.overwrite, .memory = flags.memory()};
-  // Again, now that the inputs with the files beside them are known.
+  // Again, now that files beside the inputs are known.
   ANCHORSPLAT_RETURN_IF_ERROR(CheckCanWriteCloud(output, cloud.sh_degree, write));
   const auto [checkpoint, is_checkpoint] = CheckpointOf(flags, options, output);
   options.control.checkpoint = checkpoint;
@@ -255,12 +259,13 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
   }
   ANCHORSPLAT_RETURN_IF_ERROR(WriteCloudOrSaveBeside(output, enhanced.cloud, write, extras));
   const EnhanceReport& r = enhanced.report;
-  before.render_mode = enhanced.cloud.render_mode;  // both as it was trained
+  before.render_mode = enhanced.cloud.render_mode;  // both as trained
   if (flags.view) ANCHORSPLAT_RETURN_IF_ERROR(WritePage(input, before, output, enhanced, WriteOptionsFrom(shared)));
   if (r.interrupted) {
     if (!checkpoint.empty() && Exists(checkpoint)) {
       const Status noted = NoteFilesLeft(checkpoint);
-      if (!noted.ok()) LogWarning(Cat("--resume will need -w for the files left here: ", noted.error().message));
+      if (!noted.ok())
+        LogWarning(Cat("--resume will need -w to replace the files written so far: ", noted.error().message));
     }
     return WithWayOn({ErrorCode::kInterrupted, Cat("stopped; ", output.string(), " holds the result so far")},
                      checkpoint);
@@ -302,7 +307,10 @@ Status RunInputs(const EnhanceWords& flags, Program& program) {
   if (flags.view) ANCHORSPLAT_RETURN_IF_ERROR(CheckPages(outputs));
   ANCHORSPLAT_RETURN_IF_ERROR(MakeOutDir(flags));
 
-  // For all before the first is computed: a batch should not fail half-way on something known at its start.
+  if (options.quality == "best" && options.refine.images.empty()) {
+    LogInfo("--quality best works better with the training pictures. Pass them with --images");
+  }
+  // Check all outputs before the first computation, so that a batch does not fail half-way.
   for (const fs::path& output : outputs) {
     const auto [checkpoint, is_checkpoint] = CheckpointOf(flags, options, output);
     const std::vector<fs::path> files = OutputFiles(flags, output);
@@ -312,7 +320,7 @@ Status RunInputs(const EnhanceWords& flags, Program& program) {
       if (options.control.resume) RecordWhatWasLeft(checkpoint, files);
     }
     ANCHORSPLAT_RETURN_IF_ERROR(CheckOutput(output, {.overwrite = shared.overwrite, .memory = flags.memory()}));
-    if (shared.overwrite) {  // so that an interruption leaves them under these names
+    if (shared.overwrite) {  // so that an interruption may replace them
       for (const fs::path& file : files) RecordOwnFile(file);
     }
     if (flags.view) ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(PagePath(output), shared.overwrite));
@@ -323,7 +331,7 @@ Status RunInputs(const EnhanceWords& flags, Program& program) {
   std::vector<OutputPlan> plans;
   for (size_t i = 0; i < outputs.size(); ++i) {
     items.push_back({flags.inputs[i], outputs[i].string()});
-    // How many lie in a region, no header says.
+    // Only the data says how many Gaussians lie in a region.
     const std::optional<CloudExtent> extent = options.region ? std::nullopt : ExtentOf(flags.inputs[i]);
     said.push_back(extent.has_value());
     if (extent) plans.push_back(PlanOf(options, flags.inputs[i], outputs[i], *extent));
@@ -363,9 +371,12 @@ void AddEnhance(CLI::App& app, Program& program) {
                            "anchorsplat enhance scan.ply -o scan-4x.ply --cameras transforms.json");
   const auto flags = std::make_shared<EnhanceWords>();
   verb.add_option("inputs", flags->inputs, "Splat files")->required()->check(NotEmpty());
-  auto* output = verb.add_option("-o,--output", flags->output, "Output file, for one input; - is standard output");
-  flags->to_option = verb.add_option("--to", flags->to, kPipedFormatHelp)->capture_default_str();
-  verb.add_option("--out-dir", flags->out_dir, "Output folder; files keep the names of the inputs")->excludes(output);
+  auto* output = verb.add_option("-o,--output", flags->output, "Output file, for one input; - is standard output")
+                     ->type_name("FILE");
+  flags->to_option = verb.add_option("--to", flags->to, kPipedFormatHelp)->type_name("FORMAT")->capture_default_str();
+  verb.add_option("--out-dir", flags->out_dir, "Output folder; files keep the names of the inputs")
+      ->type_name("FOLDER")
+      ->excludes(output);
   verb.add_flag("--view", flags->view, "Also write an HTML page beside the output that shows before and after");
   flags->how.AddTo(verb);
   flags->size.AddTo(verb);

@@ -36,8 +36,9 @@ class EnhanceVerb : public testing::Test {
 
 TEST_F(EnhanceVerb, Filter) {
   const ProgramRun run = ExpectDone(Enhance({"--method", "filter"}));
-  EXPECT_THAT(run.out, AllOf(HasSubstr("scan.ply -> "), HasSubstr("200 Gaussians in, 200 out; filter 4x, strength "),
-                             HasSubstr("pixel size 0.02 (given)")));
+  EXPECT_THAT(run.out,
+              AllOf(HasSubstr("scan.ply -> "), HasSubstr("200 Gaussians in, 200 out; filter 4x, filter strength "),
+                    HasSubstr("pixel size 0.02 (given)")));
   EXPECT_THAT(run.err, IsEmpty());
   const nlohmann::json row =
       ExpectJson(Enhance({"--method", "filter", "--upscale", "2", "--filter-strength", "0.5"}, "two.ply"))[0];
@@ -90,13 +91,13 @@ TEST_F(EnhanceVerb, PixelSizeOfTheCamerasOrOfTheSplat) {
   const ProgramRun run =
       RunWords({"enhance", input, "-o", folder_ / "cameras.ply", "--method", "filter", "--cameras", cameras, "--json"});
   EXPECT_EQ(run.code, 0);
-  EXPECT_THAT(run.err, HasSubstr("--camera-rule median: the cameras surround the subject"));
+  EXPECT_THAT(run.err, HasSubstr("--camera-rule median, as the cameras surround the subject"));
   EXPECT_EQ(run.json()[0]["pixel_size"]["source"], "cameras");
   EXPECT_EQ(run.json()[0]["camera_rule"], "median");
   EXPECT_THAT(FileBytes(folder_ / "cameras.ply").substr(0, 500), HasSubstr("\ncomment world up: 0 "));
   const ProgramRun read = ExpectDone({"enhance", input, "-o", folder_ / "auto.ply", "--method", "filter"});
   EXPECT_THAT(read.err, AllOf(HasSubstr("looks like a classic 3DGS fit"), HasSubstr("using ")));
-  EXPECT_THAT(read.out, HasSubstr("(read)"));
+  EXPECT_THAT(read.out, HasSubstr("(estimated)"));
 
   WriteText(folder_ / "wide.json", R"([{"id":0,"img_name":"a","width":4096,"height":4096,"position":[0,0,-1.7],)"
                                    R"("rotation":[[1,0,0],[0,1,0],[0,0,1]],"fx":4944,"fy":4944}])");
@@ -127,7 +128,7 @@ TEST_F(EnhanceVerb, PageThatNoBrowserOpens) {
   ASSERT_TRUE(WriteCloud(folder_ / "large.ply", SmallScan(300'000, 0)).ok());
   ExpectRefused({"enhance", folder_ / "large.ply", "-o", folder_ / "huge.ply", "--view", "--pixel-size", "0.0055",
                  "--method", "refine", "--k", "64"},
-                ErrorCode::kBadArgument, {"huge.html: the page of --view would take about", "enhance without --view"});
+                ErrorCode::kBadArgument, {"huge.html: the page of --view would have about", "enhance without --view"});
   EXPECT_FALSE(Exists("huge.ply"));
 }
 
@@ -200,6 +201,8 @@ TEST_F(EnhanceVerb, Qualities) {
   const nlohmann::json good =
       ExpectJson(Enhance({"--quality", "good", "--steps", "1", "--poses", "8"}, "good.ply", ""))[0];
   EXPECT_EQ(good["method"], "model+refine");
+  EXPECT_THAT(ExpectDone(Enhance({"--quality", "best", "--steps", "1", "--poses", "8"}, "alone.ply", "")).err,
+              HasSubstr("works better with the training pictures"));
   EXPECT_EQ(good["refine"]["k"], 1);
   ExpectRefused(Enhance({"--quality", "good", "--method", "filter"}, "bad.ply"), ErrorCode::kBadArgument,
                 {"--quality good is --method model+refine, so it excludes --method filter"});
@@ -254,7 +257,7 @@ TEST_F(EnhanceVerb, RefinementsThatMakeNoSense) {
   // No file is lost to a checkpoint.
   WriteText(folder_ / "mine", "mine");
   refused({"--steps", "2", "--checkpoint", scan_}, ErrorCode::kBadArgument);
-  refused({"--steps", "2", "--checkpoint", folder_ / "x.ply"}, ErrorCode::kBadArgument, "is the output itself");
+  refused({"--steps", "2", "--checkpoint", folder_ / "x.ply"}, ErrorCode::kBadArgument, "is also the output");
   refused({"--steps", "2", "--checkpoint", folder_ / "mine", "-w"}, ErrorCode::kExists, "is not a checkpoint");
   EXPECT_EQ(FileBytes(folder_ / "mine"), "mine");
   ExpectRefused({"enhance", scan_, "-o", "/proc/x.ply", "--method", "refine", "--pixel-size", "0.02"}, ErrorCode::kIo);

@@ -42,19 +42,19 @@ struct FitWords {
   FitFlags how;
   std::string to = ".ply";
   const CLI::Option* to_option = nullptr;
-  const StandardOutput* piped = nullptr;  // the output goes there
+  const StandardOutput* piped = nullptr;  // destination of the output
 
   OutputMemory* memory() const { return piped != nullptr ? piped->memory() : nullptr; }
 };
 
-// All that a fit writes.
+// All files that a fit writes.
 std::vector<fs::path> OutputFiles(const FitWords& flags) {
   std::vector<fs::path> files = FilesOfCloud(flags.output, flags.how.standard.objective.render.sh_degree);
   if (!flags.gsplat_checkpoint.empty()) files.emplace_back(flags.gsplat_checkpoint);
   return files;
 }
 
-// What can be known to fail before hours of work, once the inputs are known.
+// Checks before hours of work, once the inputs are known.
 Status CheckOutputs(const FitWords& flags, const FitControl& control, bool overwrite) {
   const SplatFormat* format = FormatOfExtension(flags.output);
   const auto is_piped = [&](const fs::path& path) { return flags.piped != nullptr && path == flags.piped->path(); };
@@ -64,12 +64,12 @@ Status CheckOutputs(const FitWords& flags, const FitControl& control, bool overw
   if (!control.checkpoint.empty()) {
     ANCHORSPLAT_RETURN_IF_ERROR(CheckCheckpoint(control.checkpoint, control.outputs, flags.how.resume, overwrite));
   }
-  // A continued fit replaces what its interruption left.
+  // A resumed fit replaces what its interruption left.
   if (flags.how.resume) RecordWhatWasLeft(control.checkpoint, control.outputs);
   for (const fs::path& path : control.outputs) {
     if (is_piped(path)) continue;
     ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, overwrite));
-    if (overwrite) RecordOwnFile(path);  // so that an interruption leaves it under this name
+    if (overwrite) RecordOwnFile(path);  // so that an interruption may replace it
   }
   return {};
 }
@@ -85,7 +85,7 @@ void PrintReport(const FitWords& flags, const FitReport& r) {
   }
 }
 
-// Each file that can be written is, whatever becomes of the other one.
+// Writes each file even if the other fails.
 Status WriteResults(const FitWords& flags, const Fitted& fitted, bool overwrite) {
   const Status splat =
       WriteCloudOrSaveBeside(flags.output, fitted.cloud, {.overwrite = overwrite, .memory = flags.memory()});
@@ -120,7 +120,7 @@ Status RunProject(const FitWords& flags, const SharedFlags& shared) {
   const DeviceUse device;
   FitControl control;
   control.checkpoint = flags.how.checkpoint;
-  // Beside standard output there is nothing.
+  // Standard output has no files beside it.
   if (flags.how.checkpoint.empty() && flags.piped == nullptr) control.checkpoint = flags.output + ".checkpoint";
   control.checkpoint_every = flags.how.checkpoint_every;
   control.resume = flags.how.resume;
@@ -183,9 +183,13 @@ void AddFit(CLI::App& app, Program& program) {
           "or of `dataset build`")
       ->required()
       ->check(NotEmpty());
-  verb.add_option("-o,--output", flags->output, "Output file; - is standard output")->required()->check(NotEmpty());
-  flags->to_option = verb.add_option("--to", flags->to, kPipedFormatHelp)->capture_default_str();
+  verb.add_option("-o,--output", flags->output, "Output file; - is standard output")
+      ->type_name("FILE")
+      ->required()
+      ->check(NotEmpty());
+  flags->to_option = verb.add_option("--to", flags->to, kPipedFormatHelp)->type_name("FORMAT")->capture_default_str();
   verb.add_option("--gsplat-checkpoint", flags->gsplat_checkpoint, "Also write a checkpoint of gsplat's trainer (.pt)")
+      ->type_name("FILE")
       ->check(NotEmpty());
   flags->how.AddTo(verb);
   program.device.AddTo(verb);

@@ -74,7 +74,7 @@ TEST_F(FitVerb, BeginsWhereItIsTold) {
 
 TEST_F(FitVerb, SaysWhatBecameOfItsShell) {
   const ProgramRun automatic = ExpectDone(Fit("auto.ply", {}));
-  EXPECT_THAT(automatic.err, HasSubstr("far shell: none, the first Gaussians do not say where the points end"));
+  EXPECT_THAT(automatic.err, HasSubstr("far shell: none, as the start is not the project's points"));
   EXPECT_THAT(ExpectDone(Fit("none.ply", {"--shell", "0"})).err, Not(HasSubstr("far shell")));
   EXPECT_EQ(FileBytes(folder_ / "auto.ply"), FileBytes(folder_ / "none.ply"));
   const nlohmann::json json = ExpectJson(Fit("shell.ply", {"--shell", "300"}));
@@ -98,7 +98,7 @@ TEST_F(FitVerb, KnowsItsStrategies) {
   EXPECT_EQ(mcmc["pruned"], 0);
   EXPECT_EQ(ExpectJson(Fit("absgrad.ply", {"--strategy", "absgrad"}))["gaussians"]["added"], 0);
   EXPECT_THAT(ExpectDone(Fit("mip.ply", {"--mip-filter", "--gsplat-checkpoint", folder_ / "mip.pt"})).err,
-              AllOf(HasSubstr("mip.pt: a gsplat checkpoint file has no place for the render mode mip")));
+              AllOf(HasSubstr("mip.pt: a gsplat checkpoint file cannot store the render mode mip")));
   EXPECT_EQ(ExpectJson({"info", folder_ / "mip.ply"})["render_mode"], "mip");
   ExpectRefused(Fit("x.ply", {"--strategy", "best"}), ErrorCode::kBadArgument, {"--strategy"});
 }
@@ -125,7 +125,7 @@ TEST_F(FitVerb, RefusesWhatMakesNoSense) {
   refused({"--init", "view", "--init-splat", "x.ply"}, "--init");
   refused({"--background", "1"}, "--background");
   ExpectRefused(Fit("x.xyz", {}), ErrorCode::kBadArgument, {"not a format that is written"});
-  ExpectRefused(Fit("x.ply", {"--checkpoint", folder_ / "x.ply"}), ErrorCode::kBadArgument, {"is the output itself"});
+  ExpectRefused(Fit("x.ply", {"--checkpoint", folder_ / "x.ply"}), ErrorCode::kBadArgument, {"is also the output"});
   ExpectRefused(Fit("x.ply", {"--checkpoint", folder_ / "none/state"}), ErrorCode::kNotFound);
   ExpectRefused({"fit", folder_ / "none", "-o", folder_ / "x.ply"}, ErrorCode::kNotFound, {"none"});
   fs::create_directory(folder_ / "empty");

@@ -32,25 +32,25 @@ GpuFindings LookForGpus() {
 std::string WorkingOn(const GpuAdapter& adapter) {
   const bool software = adapter.type == GpuAdapter::Type::kCpu;
   return Cat("working on ", Printable(adapter.name), " (", adapter.backend, ")",
-             software ? ", which is software and slower than --device cpu" : "");
+             software ? ", a software renderer, slower than --device cpu" : "");
 }
 
 std::string WhyNotTaken(const GpuAdapter& adapter) {
   if (!adapter.unusable.empty()) return adapter.unusable;
-  if (adapter.type == GpuAdapter::Type::kCpu) return "it is software, slower than --device cpu";
+  if (adapter.type == GpuAdapter::Type::kCpu) return "software renderer, slower than --device cpu";
   return "";
 }
 
 std::vector<std::string> LinesOf(const GpuFindings& findings) {
   if (findings.library.path.empty()) return {findings.library.problem};
-  if (findings.adapters.empty()) return {Cat(findings.library.path, " finds no adapter, so there is no driver")};
+  if (findings.adapters.empty()) return {Cat(findings.library.path, " finds no adapter: no driver is installed")};
   std::vector<std::string> lines;
   for (const GpuAdapter& adapter : findings.adapters) {
     lines.push_back(LineOf(adapter));
     if (!adapter.unusable.empty()) {
-      lines.push_back(Cat("   not taken: ", adapter.unusable));
+      lines.push_back(Cat("   cannot be used: ", adapter.unusable));
     } else if (const std::string why = WhyNotTaken(adapter); !why.empty()) {
-      lines.push_back(Cat("   not taken by auto: ", why));
+      lines.push_back(Cat("   not chosen by auto: ", why));
     }
   }
   lines.push_back(Cat("by ", findings.library.path));
@@ -59,7 +59,7 @@ std::vector<std::string> LinesOf(const GpuFindings& findings) {
 
 std::string CommandFor(const GpuFindings& findings) {
   if (findings.ready()) return "";
-  if (findings.broken()) return "name a library that is there by ANCHORSPLAT_WEBGPU, or unset it";
+  if (findings.broken()) return "set ANCHORSPLAT_WEBGPU to an existing library, or unset it";
   if (!findings.library.path.empty()) return "install the Vulkan driver of your GPU (Debian: mesa-vulkan-drivers)";
   const bool checkout = Exists(ProgramFolder().parent_path() / "scripts" / "fetch-webgpu.sh");
   return checkout ? "scripts/fetch-webgpu.sh" : "pip install wgpu==0.32.0";

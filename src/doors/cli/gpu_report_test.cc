@@ -36,8 +36,8 @@ TEST(GpuReport, SaysWhichAdapterAutoDoesNotTakeAndWhy) {
   EXPECT_THAT(
       LinesOf(gpus),
       ElementsAre("0: Card, Vulkan, discrete; bindings up to 134 MB, buffers up to 268 MB", HasSubstr("1: Card"),
-                  "   not taken by auto: it is software, slower than --device cpu", HasSubstr("2: Card"),
-                  "   not taken: it lacks something", HasSubstr("/lib/libwgpu_native-release.so")));
+                  "   not chosen by auto: software renderer, slower than --device cpu", HasSubstr("2: Card"),
+                  "   cannot be used: it lacks something", HasSubstr("/lib/libwgpu_native-release.so")));
   EXPECT_THAT(CommandFor(gpus), IsEmpty());
   const nlohmann::json json = ToJson(gpus);
   ASSERT_EQ(json["adapters"].size(), 3u);

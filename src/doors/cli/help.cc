@@ -39,7 +39,7 @@ std::string WrappedDescription(std::string_view text, size_t at) {
   return out + "\n";
 }
 
-// A name or names on the left, what they are on the right, from the next line on where the names take too much room.
+// Names on the left, description on the right; long names get a line of their own.
 std::string HelpEntry(const std::string& left, const std::string& right) {
   std::string out = "  " + left;
   if (right.empty()) return out + "\n";
@@ -89,7 +89,7 @@ std::string OptionGroups(std::span<const DeclaredOption> options) {
       groups.push_back(option.group);
     }
   }
-  // What every verb has comes last.
+  // Shared flags come last.
   if (const auto shared = std::ranges::find(groups, kSharedFlagsGroup); shared != groups.end()) {
     std::rotate(shared, shared + 1, groups.end());
   }
@@ -142,7 +142,17 @@ class VerbHelp : public CLI::FormatterBase {
         out += "\n" + next->help("", mode);
       }
     }
+    if (mode == CLI::AppFormatMode::Normal && app.get_parent() == nullptr) out += OtherVerbs(app);
     return out;
+  }
+
+  // Those without the shared flags.
+  static std::string OtherVerbs(const CLI::App& app) {
+    std::string out;
+    for (const CLI::App* verb : app.get_subcommands([](const CLI::App* v) { return v->get_group().empty(); })) {
+      out += HelpEntry(verb->get_name(), verb->get_description());
+    }
+    return out.empty() ? out : "\nOther verbs:\n" + out;
   }
 
   std::vector<std::string> options_;

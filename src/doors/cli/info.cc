@@ -28,13 +28,13 @@ std::string_view ModeName(std::optional<RenderMode> mode) {
 }
 
 std::string Number(double value) {
-  if (std::isnan(value)) return "-";  // of no Gaussian at all
+  if (std::isnan(value)) return "-";  // no Gaussians
   char text[32];
   std::snprintf(text, sizeof text, "%.4g", value);
   return text;
 }
 
-// In the world, with as many digits as `mean` alone would have.
+// World coordinate with as many digits as `mean` alone would have.
 std::string Coordinate(float mean, double origin) {
   if (origin == 0) return Number(mean);
   char text[400];
@@ -43,7 +43,7 @@ std::string Coordinate(float mean, double origin) {
   return text;
 }
 
-constexpr size_t kMostCredit = 1000;  // bytes of one that are shown
+constexpr size_t kMostCredit = 1000;  // bytes shown of a credit
 
 void PrintTable(const SplatFindings& f) {
   const CloudStatistics& s = f.statistics;
@@ -119,7 +119,7 @@ Status RunModelInfo(const std::string& path, const SharedFlags& shared) {
 
 struct InfoFlags {
   std::string file;
-  std::string from;  // name of a format; empty: found out
+  std::string from;  // name of a format; empty: recognised
 };
 
 Status RunInfo(const InfoFlags& flags, const SharedFlags& shared) {
@@ -144,7 +144,7 @@ void AddInfo(CLI::App& app, Program& program) {
                            "anchorsplat info scan.ply --json");
   const auto flags = std::make_shared<InfoFlags>();
   verb.add_option("file", flags->file, "Splat, network weights, mesh, or library.sh3f[#object]")->required();
-  verb.add_option("--from", flags->from, kInputFormatHelp)->check(NotEmpty());
+  verb.add_option("--from", flags->from, kInputFormatHelp)->type_name("FORMAT")->check(NotEmpty());
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunInfo(*flags, program.flags); }; });
 }
 

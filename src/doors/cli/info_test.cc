@@ -102,11 +102,11 @@ TEST_F(InfoVerb, OfCredits) {
   }
   for (const char* name : {"scan.spz", "scan.splat", "scan.csv", "scan.npz"}) {
     EXPECT_THAT(ExpectDone({"convert", scan, folder_ / name}).err,
-                HasSubstr("no place for credits: give \"Mug by Ann, CC BY 4.0\" beside it"))
+                HasSubstr("cannot store credits: publish \"Mug by Ann, CC BY 4.0\" with it"))
         << name;
   }
   EXPECT_THAT(ExpectRefused({"info", folder_ / "scan.npz"}, ErrorCode::kBadFile).err,
-              HasSubstr("is an NPZ file, which this version writes for other programs and does not read"));
+              HasSubstr("is an NPZ file, which can be written but not read"));
 }
 
 // Files that are gone through block by block give the numbers that reading them gives, with any number of threads.
@@ -176,7 +176,7 @@ TEST_F(InfoVerb, OfUntaggedSplats) {
   // Files that say it need not be looked at.
   EXPECT_THAT(
       ExpectDone({"enhance", fit, "-o", folder_ / "filtered.ply", "--method", "filter", "--pixel-size", "0.0055"}).out,
-      HasSubstr("strength 0.740"));
+      HasSubstr("filter strength 0.74"));
   EXPECT_THAT(ExpectDone({"info", folder_ / "filtered.ply"}).out,
               AllOf(HasSubstr("can sharpen  no: its comments say"), Not(HasSubstr("looks like"))));
   const ProgramRun twice =
@@ -195,7 +195,7 @@ TEST_F(InfoVerb, OfEnhancedSplatsThatDoNotSaySo) {
   EXPECT_THAT(ExpectDone({"enhance", lost, "-o", again, "-w", "--method", "filter", "--mode", "classic", "--pixel-size",
                           "0.0055"})
                   .out,
-              HasSubstr("strength 0.740"));
+              HasSubstr("filter strength 0.74"));
 }
 
 // What is understood of the tags, and what --mode says instead.
@@ -214,7 +214,7 @@ TEST_F(InfoVerb, OfTheRenderMode) {
   const std::string mip = folder_ / "mip.ply", spz = folder_ / "mip.spz";
   EXPECT_THAT(ExpectDone({"convert", mip, spz}).err, AllOf(HasSubstr("0.3 px²"), HasSubstr("--mode mip")));
   EXPECT_EQ(mode_of(spz), "antialiased");
-  EXPECT_THAT(ExpectDone({"convert", mip, folder_ / "mip.splat"}).err, HasSubstr("no place for the render mode mip"));
+  EXPECT_THAT(ExpectDone({"convert", mip, folder_ / "mip.splat"}).err, HasSubstr("cannot store the render mode mip"));
   EXPECT_EQ(
       ExpectRefused({"convert", scan, folder_ / "x.ply", "--mode", "blurred"}, ErrorCode::kBadArgument, {"--mode"}).out,
       "");
@@ -262,7 +262,7 @@ TEST_F(InfoVerb, RefusesWhatIsNoSplat) {
   const ProgramRun run = ExpectRefused({"info", folder_ / "points.ply", "--json"}, ErrorCode::kBadFile, {"points.ply"});
   EXPECT_EQ(run.json()["error"]["code"], "bad_file");
   WriteText(folder_ / "text.splat", FileBytes(SourceDirForTest() / "docs/architecture.md").substr(0, 3200));
-  ExpectRefused({"info", folder_ / "text.splat"}, ErrorCode::kBadFile, {"is no .splat file"});
+  ExpectRefused({"info", folder_ / "text.splat"}, ErrorCode::kBadFile, {"is text, not a .splat file"});
   WriteText(folder_ / "empty.splat", "");
   ExpectRefused({"info", folder_ / "empty.splat"}, ErrorCode::kBadFile, {"empty.splat: is empty"});
   ExpectRefused({"info", folder_ / "\x1b[2J\xff.ply"}, ErrorCode::kNotFound, {"\\x1b[2J\\xff.ply: no such file"});

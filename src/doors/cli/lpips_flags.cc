@@ -10,6 +10,7 @@ void AddLpipsFlags(CLI::App& verb, std::string& net, std::string& folder) {
   verb.add_option("--lpips-weights", folder,
                   "Folder that scripts/fetch-lpips.sh filled (default: $ANCHORSPLAT_LPIPS, else "
                   "~/.local/share/anchorsplat/lpips)")
+      ->type_name("FOLDER")
       ->check(NotEmpty())
       ->needs(option);
 }

@@ -36,10 +36,10 @@ nlohmann::json ToJson(const std::vector<DeclaredVerb>& verbs) {
 
 }  // namespace
 
-// For the build, which installs what this prints: no verb for people, so --help does not list it.
+// Used by the build, which installs the output.
 void AddManual(CLI::App& app, Program& program) {
   CLI::App& verb =
-      *app.add_subcommand("manual", "Print the manual page, completion for a shell, or what is declared as JSON");
+      *app.add_subcommand("manual", "Print the manual page, shell completion, or all verbs and options as JSON");
   verb.group("");
   const auto kind = std::make_shared<std::string>();
   verb.add_option("kind", *kind, "What to print")->required()->check(CLI::IsMember({"man", "bash", "zsh", "json"}));

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What is smaller and quicker is there before anybody has read what it will be.
+// Smaller and quicker outputs need no announcement.
 constexpr uint64_t kWorthAWord = 100'000'000;
 constexpr double kLongWait = 5;
 
@@ -30,11 +30,11 @@ bool IsYes(const std::string& answer) { return answer == "y" || answer == "Y" ||
 void SizeFlags::AddTo(CLI::App& verb) {
   const std::string group = "Large splats";
   verb.add_option("--max-memory", max_memory,
-                  "Most memory for large arrays, such as 2G or 500M; beyond it, temporary files beside the output "
+                  "Memory for large arrays, such as 2G or 500M; the rest goes to temporary files beside the output "
                   "(default: a quarter of the machine's)")
       ->transform(MemorySize())
       ->group(group);
-  verb.add_flag("--yes", yes, "Write without asking, even more than 4 GB or than the disk has room for")->group(group);
+  verb.add_flag("--yes", yes, "Do not ask before writing more than 4 GB or than the disk has room for")->group(group);
 }
 
 uint64_t SizeFlags::memory() const { return max_memory > 0 ? max_memory : DefaultMaxMemory(); }
@@ -56,7 +56,7 @@ uint64_t TemporaryBytes(const OutputPlan& plan, const SizeFlags& flags) {
   return plan.needed > flags.arrays() ? plan.needed - flags.arrays() : 0;
 }
 
-// What one will be, as a sentence.
+// One output, as a sentence.
 std::string Spoken(const OutputPlan& plan, const SizeFlags& flags) {
   const uint64_t temporary = TemporaryBytes(plan, flags);
   const bool grows = plan.gaussians > plan.gaussians_in;
@@ -76,7 +76,7 @@ std::string Spoken(const OutputPlan& plan, const SizeFlags& flags) {
 
 Status SayAndAsk(std::span<const OutputPlan> plans, const SizeFlags& flags, const SharedFlags& shared) {
   if (plans.empty()) return {};
-  // Results add up, temporary files go before the next begins. All lie in one folder.
+  // Outputs add up; temporary files are removed before the next. All are in one folder.
   uint64_t bytes = 0, temporary = 0;
   for (const OutputPlan& plan : plans) {
     bytes += plan.bytes;
@@ -107,7 +107,7 @@ Status SayAndAsk(std::span<const OutputPlan> plans, const SizeFlags& flags, cons
   std::string answer;
   std::getline(std::cin, answer);
   if (IsYes(answer)) return {};
-  return Error{ErrorCode::kBadArgument, Cat(plans.front().output.string(), ": not written, as the answer was not yes")};
+  return Error{ErrorCode::kBadArgument, Cat(plans.front().output.string(), ": not written: the answer was not yes")};
 }
 
 }  // namespace anchorsplat

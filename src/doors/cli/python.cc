@@ -6,19 +6,21 @@
 
 namespace anchorsplat {
 
-// The verbs that are Python (docs/python.md): this program only says where they come from. Not listed by --help.
+// Stubs of the verbs that the Python package implements (docs/python.md): they say how to install it.
 void AddPython(CLI::App& app, Program& program) {
-  for (const auto& [name, what] :
-       {std::pair("serve", "a service in the browser"), std::pair("batch", "many machines")}) {
-    CLI::App& verb = *app.add_subcommand(name, Cat("Of the Python package: ", what));
+  for (const auto& [name, what] : {std::pair("serve", "HTTP service with a web page"),
+                                   std::pair("batch", "Many splats on many cores and machines")}) {
+    CLI::App& verb = *app.add_subcommand(name, Cat(what, " (Python package)"));
+    verb.footer(Cat("Install it with pip install '.[", name, "]' in the sources, then run anchorsplat ", name,
+                    " --help again (docs/python.md)"));
     verb.group("");
     verb.allow_extras();
     verb.prefix_command();
     verb.callback([verb_name = std::string(name), &program] {
       program.run = [verb_name]() -> Status {
         return Error{ErrorCode::kBadArgument,
-                     Cat(verb_name, " is part of the Python package: pip install '.[", verb_name,
-                         "]' in the sources, and the anchorsplat that this installs has it (docs/python.md)")};
+                     Cat(verb_name, " is part of the Python package: run pip install '.[", verb_name,
+                         "]' in the sources and use the anchorsplat it installs (docs/python.md)")};
       };
     });
   }

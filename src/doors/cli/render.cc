@@ -35,11 +35,11 @@ struct RenderFlags {
   std::string input;
   std::string output;
   bool transparent = false;
-  std::string enlarge_with;  // a network's file; empty: as it is rendered
+  std::string enlarge_with;  // network file; empty: not enlarged
   ViewFlags views;
 };
 
-// One picture goes to a file, several to a folder under the views' names, which may have folders in them.
+// One picture goes to a file, several to a folder under the views' names, which may contain folders.
 Result<std::vector<fs::path>> OutputPaths(const std::string& output, const CameraSet& cameras, bool overwrite) {
   const bool to_file = IsPngName(output);
   if (!to_file && IsPictureName(output)) {
@@ -72,14 +72,14 @@ Result<std::vector<fs::path>> OutputPaths(const std::string& output, const Camer
       std::error_code code;
       fs::create_directories(path.parent_path(), code);
       if (code) {
-        return Error{ErrorCode::kIo, Cat(path.parent_path().string(), ": cannot make this folder: ", code.message())};
+        return Error{ErrorCode::kIo, Cat(path.parent_path().string(), ": cannot create this folder: ", code.message())};
       }
     }
   }
   return paths;
 }
 
-// What networks have seen: colours of pictures, and no more light than they hold.
+// Clamps to the colours of pictures, on which networks were trained.
 Image Clamped(Image image) {
   for (float& value : image.pixels) value = std::clamp(value, 0.0f, 1.0f);
   return image;
@@ -107,7 +107,7 @@ Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
   const std::string comment = network ? EnlargedComment(network->info(), network->info().scale) : "";
   double seconds = 0;
   nlohmann::json views = nlohmann::json::array();
-  std::string empty;  // what is wrong with the first view that shows nothing
+  std::string empty;  // why the first empty view is empty
   int64_t empty_views = 0;
   {
     ConstantCloud still(cloud);
@@ -163,11 +163,13 @@ void AddRender(CLI::App& app, Program& program) {
   const auto flags = std::make_shared<RenderFlags>();
   verb.add_option("input", flags->input, "Splat file")->required();
   verb.add_option("-o,--output", flags->output, "One view: a .png file, or - for standard output. Several: a folder")
+      ->type_name("PATH")
       ->required()
       ->check(NotEmpty());
   flags->views.AddTo(verb);
   verb.add_option("--enlarge-with", flags->enlarge_with,
                   "Network that enlarges the renders, a .safetensors of scripts/fetch-upscaler.sh")
+      ->type_name("FILE")
       ->check(NotEmpty());
   verb.add_flag("--transparent", flags->transparent, "Write an alpha channel instead of a background")
       ->excludes("--background");

@@ -22,7 +22,7 @@ namespace {
 
 constexpr const char* kName = "standard output";
 
-// A pipe that nobody reads any more is an error like a full disk.
+// A pipe without a reader is an error, like a full disk.
 Status WriteAll(std::span<const std::byte> bytes) {
   auto* const before = std::signal(SIGPIPE, SIG_IGN);
   int error = 0;
@@ -33,7 +33,7 @@ Status WriteAll(std::span<const std::byte> bytes) {
   }
   std::signal(SIGPIPE, before);
   if (error == 0) return {};
-  return Error{ErrorCode::kIo, Cat(kName, " could not be written: ", std::generic_category().message(error))};
+  return Error{ErrorCode::kIo, Cat("cannot write to ", kName, ": ", std::generic_category().message(error))};
 }
 
 }  // namespace
@@ -79,8 +79,7 @@ std::string OutputName(const std::filesystem::path& output, const OutputMemory* 
 
 Status CheckOutDir(const std::string& folder) {
   if (!IsStandardOutput(folder)) return {};
-  return Error{ErrorCode::kBadArgument,
-               Cat("--out-dir ", folder, ": is standard output, not a folder (./- is a folder called so)")};
+  return Error{ErrorCode::kBadArgument, Cat("--out-dir ", folder, ": means standard output (./- names a folder)")};
 }
 
 std::ostream& ResultsBeside(const OutputMemory* piped) { return piped != nullptr ? std::cerr : std::cout; }

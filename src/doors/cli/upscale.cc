@@ -35,9 +35,9 @@ struct UpscaleWords {
   UpscaleFlags how;
 };
 
-// A picture keeps its name; those of a folder keep theirs below it.
+// Pictures keep their names; those in folders keep their paths.
 Result<std::vector<BatchItem>> Items(const UpscaleWords& flags, bool overwrite) {
-  std::vector<std::pair<fs::path, fs::path>> found;  // and the name below the output
+  std::vector<std::pair<fs::path, fs::path>> found;  // picture, and its name in the output folder
   for (const std::string& input : flags.pictures) {
     if (!IsFolder(input)) {
       found.emplace_back(input, fs::path(input).filename());
@@ -87,10 +87,10 @@ Result<nlohmann::json> Enlarge(const BatchItem& item, Upscaler& network, const E
   if (const fs::path folder = fs::path(item.output).parent_path(); !folder.empty() && write.memory == nullptr) {
     std::error_code code;
     fs::create_directories(folder, code);
-    if (code) return Error{ErrorCode::kIo, Cat(folder.string(), ": cannot make this folder: ", code.message())};
+    if (code) return Error{ErrorCode::kIo, Cat(folder.string(), ": cannot create this folder: ", code.message())};
   }
   const std::string comment = EnlargedComment(network.info(), options.factor);
-  // What an enlarged rendering is compared with needs no camera either.
+  // Comparing an enlarged rendering needs no camera either.
   ANCHORSPLAT_RETURN_IF_ERROR(IsOwnRendering(item.input) ? WriteRendering(item.output, enlarged, write, comment)
                                                          : WritePng(item.output, enlarged, write, comment));
   return nlohmann::json{{"input", item.input},      {"output", item.output},
@@ -147,6 +147,7 @@ void AddUpscale(CLI::App& app, Program& program) {
       ->check(NotEmpty());
   verb.add_option("-o,--output", flags->output,
                   "Folder for PNGs; for one picture also a .png file, or - for standard output")
+      ->type_name("PATH")
       ->required()
       ->check(NotEmpty());
   flags->how.AddTo(verb);

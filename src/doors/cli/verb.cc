@@ -91,7 +91,7 @@ int RunProgram(int argc, const char* const* argv, Trainer trainer) {
   program.words.assign(argv, argv + argc);
   program.trainer = trainer;
   AddVerbs(app, program);
-  // Parsing failed, so whether JSON was asked for has to be read off the words themselves.
+  // After a parse error the flags are not set: looks for --json in the words.
   const auto usage_error = [&program](const Error& error) {
     SharedFlags flags;
     flags.json = std::ranges::find(program.words, "--json") != program.words.end();
@@ -106,26 +106,32 @@ int RunProgram(int argc, const char* const* argv, Trainer trainer) {
   } catch (const CLI::ParseError& error) {
     // CLI11 answers --help and --version through this path with exit code 0.
     if (error.get_exit_code() == 0) return app.exit(error);
-    return usage_error({ErrorCode::kBadArgument, Cat(error.what(), " (--help shows how)")});
+    std::string what = error.what();
+    // An option that is not recognised may be why another is missing.
+    const auto code = static_cast<CLI::ExitCodes>(error.get_exit_code());
+    if (code == CLI::ExitCodes::ExtrasError || code == CLI::ExitCodes::RequiredError) {
+      if (const std::string unknown = UnknownOption(app, words); !unknown.empty()) what = unknown;
+    }
+    return usage_error({ErrorCode::kBadArgument, Cat(what, " (--help shows how)")});
   }
 
-  // A limit on the size of files is an error of the write that meets it, not the end of the program.
+  // Beyond the file size limit, a write fails instead of ending the program.
   std::signal(SIGXFSZ, SIG_IGN);
   const SharedFlags& flags = program.flags;
   SetLogSink(flags.json_progress ? MakeJsonSink(flags.quiet) : MakeTerminalSink(flags.quiet));
   SetThreadCount(flags.threads);
-  // What is put down here is known in the runs that verbs begin to be stopped (stop_signal.h).
+  // Runs that verbs start to be stoppable inherit this (stop_signal.h).
   const RunScope run({.device = program.device.device, .max_gpu_memory = program.device.max_gpu_memory});
-  const InputRecord record;  // nothing that the verb reads is overwritten by it
+  const InputRecord record;  // the verb never overwrites what it reads
   try {
-    // Before hours of work: nobody who asked for a GPU is content with the CPU.
+    // A requested GPU that is missing is an error now, not after hours on the CPU.
     const auto gpu = GpuOfRun();
     if (!gpu.ok()) return Fail(flags, gpu.error());
     if (*gpu != nullptr) LogInfo(WorkingOn((*gpu)->adapter()));
     const Status status = program.run();
     if (!status.ok()) return Fail(flags, status.error());
     std::cout.flush();
-    if (!std::cout) return Fail(flags, {ErrorCode::kIo, "standard output could not be written"});
+    if (!std::cout) return Fail(flags, {ErrorCode::kIo, "cannot write to standard output"});
     return program.exit_code;
   } catch (const RunAbandoned&) {
     return Fail(flags, {ErrorCode::kInterrupted, "stopped; unfinished output was removed"});

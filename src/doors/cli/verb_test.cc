@@ -114,6 +114,7 @@ TEST(CommandLine, WordsThatAreNoVerb) {
   EXPECT_THAT(far.err, Not(HasSubstr("did you mean")));
   EXPECT_EQ(ExpectRefused({"enhance", "--json"}, ErrorCode::kBadArgument).json()["error"]["code"], "bad_argument");
   ExpectRefused({"info", "x.ply", "--colour"}, ErrorCode::kBadArgument, {"--colour", "--help shows how"});
+  ExpectRefused({"enhance", "--upscal", "4"}, ErrorCode::kBadArgument, {"did you mean '--upscale'?"});
 }
 
 // Finite ones, whatever the option; whole ones have 64 bits. The message names the option and stays readable.
@@ -186,6 +187,9 @@ TEST(CommandLine, ProgressAsJson) {
 }
 
 TEST(CommandLine, VerbsOfThePythonPackageSayWhereTheyAre) {
+  EXPECT_THAT(ExpectDone({"--help"}).out,
+              AllOf(HasSubstr("\n  serve "), HasSubstr("\n  batch "), HasSubstr("\n  manual ")));
+  EXPECT_THAT(ExpectDone({"serve", "--help"}).out, HasSubstr("Usage: anchorsplat serve"));
   ExpectRefused({"serve"}, ErrorCode::kBadArgument, {"pip install '.[serve]'"});
   ExpectRefused({"serve", "--port", "1", "x"}, ErrorCode::kBadArgument, {"pip install '.[serve]'"});
   ExpectRefused({"batch", "enhance", "a.ply", "--out", "b"}, ErrorCode::kBadArgument, {"'.[batch]'"});

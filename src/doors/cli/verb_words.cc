@@ -2,13 +2,14 @@
 
 #include <algorithm>
 
+#include "cli/verb_tree.h"
 #include "core/text.h"
 
 namespace anchorsplat {
 
 namespace {
 
-// Those that help lists.
+// Without hidden ones.
 std::vector<std::string> Verbs(const CLI::App& app) {
   std::vector<std::string> verbs;
   for (const CLI::App* verb : app.get_subcommands([](const CLI::App* v) { return !v->get_group().empty(); })) {
@@ -17,17 +18,28 @@ std::vector<std::string> Verbs(const CLI::App& app) {
   return verbs;
 }
 
-// Half of the letters may differ: more is another word.
-std::string Nearest(const std::string& word, const std::vector<std::string>& verbs) {
+// Empty if none is near: half of the letters may differ.
+std::string Nearest(const std::string& word, const std::vector<std::string>& known) {
   std::string best;
   size_t least = std::string::npos;
-  for (const std::string& verb : verbs) {
-    const size_t distance = EditDistance(word, verb);
-    if (2 * distance > std::max(word.size(), verb.size()) + 1 || distance >= least) continue;
-    best = verb;
+  for (const std::string& one : known) {
+    const size_t distance = EditDistance(word, one);
+    if (2 * distance > std::max(word.size(), one.size()) + 1 || distance >= least) continue;
+    best = one;
     least = distance;
   }
   return best;
+}
+
+// Without dashes.
+std::vector<std::string> LongNames(const CLI::App& verb) {
+  std::vector<std::string> names = {"help", "help-all"};
+  for (const DeclaredOption& option : DeclaredBy(verb).options) {
+    for (const std::string& name : option.names) {
+      if (name.starts_with("--")) names.push_back(name.substr(2));
+    }
+  }
+  return names;
 }
 
 }  // namespace
@@ -43,7 +55,7 @@ Status CheckVerbWords(const CLI::App& app, std::span<const std::string> words) {
     if (k >= words.size()) {
       return Error{ErrorCode::kBadArgument, Cat("'", said, "' needs a verb: ", list, " (--help shows more)")};
     }
-    const CLI::App* next = nullptr;  // hidden ones too
+    const CLI::App* next = nullptr;  // may be hidden
     for (const CLI::App* verb : at->get_subcommands([](const CLI::App*) { return true; })) {
       if (verb->check_name(words[k])) next = verb;
     }
@@ -56,6 +68,25 @@ Status CheckVerbWords(const CLI::App& app, std::span<const std::string> words) {
     at = next;
     said += " " + words[k];
   }
+}
+
+std::string UnknownOption(const CLI::App& app, std::span<const std::string> words) {
+  const CLI::App* verb = &app;
+  std::string said = app.get_name();
+  for (const std::string& word : words.subspan(std::min<size_t>(1, words.size()))) {
+    if (word == "--") break;
+    for (const CLI::App* next : verb->get_subcommands([&](const CLI::App* v) { return v->check_name(word); })) {
+      verb = next;
+      said += " " + word;
+    }
+    if (!word.starts_with("--")) continue;
+    const std::string name = word.substr(0, word.find('='));
+    if (verb->get_option_no_throw(name) != nullptr) continue;
+    const std::string nearest = Nearest(name.substr(2), LongNames(*verb));
+    return Cat("'", said, "' has no option '", Printable(name), "'",
+               nearest.empty() ? "" : Cat("; did you mean '--", nearest, "'?"));
+  }
+  return {};
 }
 
 std::vector<std::string> WithLongNames(const CLI::App& app, std::span<const std::string> words) {

@@ -10,16 +10,19 @@
 
 namespace anchorsplat {
 
-// That the words of a command line begin with a verb of `app`, and with one of its subcommands where it has some. The
-// error (kBadArgument) names the verbs there are and the one nearest to what was typed. `words` is argv; options are
-// left to the library.
+// Checks that a command line begins with a verb of `app`, and with a subcommand if the verb has some. The error
+// (kBadArgument) lists the verbs and suggests the nearest. `words` is argv; CLI11 checks the options.
 Status CheckVerbWords(const CLI::App& app, std::span<const std::string> words);
 
-// The same words, where "-o=page.html" says "--output=page.html": the library would take the = for a part of the value,
-// and behind a flag for another flag.
+// "'anchorsplat info' has no option '--jsn'; did you mean '--json'?" for the first unknown long option; empty if all
+// are known.
+std::string UnknownOption(const CLI::App& app, std::span<const std::string> words);
+
+// The same words with "-o=page.html" as "--output=page.html": CLI11 would take the = as part of the value, or, after a
+// flag, as another flag.
 std::vector<std::string> WithLongNames(const CLI::App& app, std::span<const std::string> words);
 
-// How many letters have to be changed, added, left out or exchanged with their neighbour to make `b` of `a`.
+// Number of letters to change, add, remove or swap with their neighbour to turn `a` into `b`.
 size_t EditDistance(std::string_view a, std::string_view b);
 
 }  // namespace anchorsplat

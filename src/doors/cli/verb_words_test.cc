@@ -59,6 +59,16 @@ TEST_F(VerbWords, AShortNameTakesAnEqualsSign) {
   }
 }
 
+TEST_F(VerbWords, AnUnknownOptionIsNamedWithTheNearest) {
+  app_.get_subcommand("convert")->add_flag("-F,--filter-floaters");
+  using Words = std::vector<std::string>;
+  EXPECT_EQ(UnknownOption(app_, Words{"anchorsplat", "convert", "a", "--filter-floaters", "-x", "--", "--y"}), "");
+  EXPECT_EQ(UnknownOption(app_, Words{"anchorsplat", "convert", "a", "--filter-floater=2"}),
+            "'anchorsplat convert' has no option '--filter-floater'; did you mean '--filter-floaters'?");
+  EXPECT_EQ(UnknownOption(app_, Words{"anchorsplat", "dataset", "build", "--xyzzyxyzzy"}),
+            "'anchorsplat dataset build' has no option '--xyzzyxyzzy'");
+}
+
 TEST(EditDistance, CountsLetters) {
   EXPECT_EQ(EditDistance("", "abc"), 3u);
   EXPECT_EQ(EditDistance("abc", ""), 3u);

@@ -40,7 +40,7 @@ struct PageWords {
   EditFlags edits;
 };
 
-// More Gaussians than this make a single file that browsers take long to show.
+// Above this, a single file loads slowly in browsers.
 constexpr int64_t kManyGaussians = 1'000'000;
 
 uint64_t FileBytes(const fs::path& path) {
@@ -49,11 +49,11 @@ uint64_t FileBytes(const fs::path& path) {
   return failed ? 0 : bytes;
 }
 
-// What one loses by a single file, where it is much.
+// Warns if a single file is large.
 void WarnOfLargePage(const PageWords& flags, int64_t gaussians, uint64_t bytes) {
   if (flags.folder || gaussians <= kManyGaussians) return;
   LogWarning(Cat(flags.output, ": ", WithThousands(gaussians), " Gaussians in one file of ", HumanBytes(bytes),
-                 ", which a browser loads whole and slowly. --folder writes a page that streams"));
+                 " load slowly in a browser. Pass --folder to write a page that streams them"));
 }
 
 struct Shown {
@@ -62,7 +62,7 @@ struct Shown {
   uint64_t bytes = 0;
 };
 
-// A splat to show: a file with nothing to see in it is a bad one.
+// Reads a splat to show; an empty one is an error.
 Result<Shown> ReadShown(const fs::path& path, const std::optional<RenderMode>& mode) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSplat file, OpenedSplat::Open(path));
   // "scan/" is called scan.
@@ -78,20 +78,20 @@ Result<Shown> ReadShown(const fs::path& path, const std::optional<RenderMode>& m
                                         " Gaussians have NaN or infinite values")};
 }
 
-// The edits that were asked for, in their order. Cameras stay where they are: they fit no splat that has moved.
+// The given edits, in order. Edits that move the splat exclude cameras, which do not move.
 Result<std::vector<EditAction>> EditsOf(const PageWords& flags) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(auto actions, ActionsAmongPaths(flags.edits));
   for (const EditAction& action : actions[0]) {
     const bool moves = std::holds_alternative<MoveWorld>(action.what) || std::holds_alternative<TurnToUp>(action.what);
     if (moves && !flags.how.cameras.empty()) {
       return Error{ErrorCode::kBadArgument,
-                   Cat(action.words, " moves the splat away from its cameras: drop --cameras")};
+                   Cat(action.words, " moves the splat away from its cameras: omit --cameras")};
     }
   }
   return std::move(actions[0]);
 }
 
-// What edits make of a splat, and what each of them did.
+// The edited splat, and a report per edit.
 Result<Shown> EditShown(const Shown& shown, const std::vector<EditAction>& actions, std::vector<EditStep>& steps) {
   const std::array<CloudView, 1> clouds = {shown.cloud};
   const std::array<EditRun, 1> runs = {EditRun{0, 1, actions}};
@@ -103,7 +103,7 @@ Result<Shown> EditShown(const Shown& shown, const std::vector<EditAction>& actio
   return Shown{std::move(edited.cloud), Cat(shown.name, ", edited")};
 }
 
-// A page written over a splat by a slip of the keyboard would be a loss.
+// Guards against overwriting a splat by a mistyped name.
 bool IsPageName(const fs::path& path) {
   std::string extension = path.extension().string();
   std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return std::tolower(c); });
@@ -127,7 +127,7 @@ Status RunView(const PageWords& flags, const SharedFlags& shared) {
   const fs::path output = piped ? piped->path() : fs::path(flags.output);
   page.folder = flags.folder;
   page.smaller = flags.folder ? "use fewer ground-truth pictures (--views)"
-                              : Cat("pass --folder for a page with its data beside it; or ", page.smaller);
+                              : Cat("pass --folder to store the data beside the page, or ", page.smaller);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<EditAction> actions, EditsOf(flags));
   const StopSignal stop_signal(StopSignal::Leaves::kNothing);
   ANCHORSPLAT_ASSIGN_OR_RETURN(Shown after, ReadShown(flags.after, flags.how.mode));
@@ -176,14 +176,17 @@ void AddView(CLI::App& app, Program& program) {
               "anchorsplat view scan-4x.ply --before scan.ply -o page.html");
   const auto flags = std::make_shared<PageWords>();
   verb.add_option("after", flags->after, "Splat file")->required();
-  verb.add_option("-o,--output", flags->output, "HTML file to write; - is standard output")->required();
-  verb.add_option("--before", flags->before, "Splat to compare with (default with edits: the unedited splat)");
+  verb.add_option("-o,--output", flags->output, "HTML file to write; - is standard output")
+      ->type_name("FILE")
+      ->required();
+  verb.add_option("--before", flags->before, "Splat to compare with (default with edits: the unedited splat)")
+      ->type_name("FILE");
   verb.add_flag("--folder", flags->folder,
                 "Store the splats in a folder beside the page, PAGE.data, and stream the largest Gaussians first; for "
                 "large splats");
   flags->how.AddTo(verb);
   flags->edits.AddTo(verb);
-  verb.remove_option(verb.get_option("--dry-run"));  // of `convert`: here the page shows it
+  verb.remove_option(verb.get_option("--dry-run"));  // only for `convert`; here the page shows the result
   program.device.AddTo(verb);
   ShortenHelp(verb, {"--output", "--before", "--cameras", "--truth", "--title", "--background", "--sh-degree",
                      "--folder", "--filter-box", "--filter-floaters", "--overwrite", "--quiet", "--json"});

@@ -12,7 +12,7 @@ namespace anchorsplat {
 
 namespace {
 
-// What is no number at all is said by the library.
+// CLI11 reports what is not a number.
 CLI::Validator Finite() {
   return CLI::Validator(
       [](const std::string& text) {
@@ -24,7 +24,7 @@ CLI::Validator Finite() {
       "");
 }
 
-// What is no number at all is said by the library here, too.
+// CLI11 reports what is not a number.
 CLI::Validator Whole(bool negative_too) {
   return CLI::Validator(
       [negative_too](const std::string& text) {
@@ -40,7 +40,7 @@ CLI::Validator Whole(bool negative_too) {
         } else {
           static_cast<void>(std::strtoull(text.c_str(), nullptr, 0));
         }
-        return errno == ERANGE ? "must be a number of 64 bits, found '" + text + "'" : std::string();
+        return errno == ERANGE ? "must fit into 64 bits, found '" + text + "'" : std::string();
       },
       "");
 }

@@ -22,7 +22,7 @@ nlohmann::json ToJson(const Deviation& deviation) { return {{"rms", deviation.rm
 }  // namespace
 
 void ConvertFlags::AddTo(CLI::App& verb) {
-  verb.add_option("--from", from, kInputFormatHelp)->check(NotEmpty());
+  verb.add_option("--from", from, kInputFormatHelp)->type_name("FORMAT")->check(NotEmpty());
   AddModeOption(verb, options.render_mode, "Rasterization to note in the output (default: as in the input)");
   verb.add_option("--sh-degree", options.sh_degree, "Highest degree of spherical harmonics to keep, 0 to 3")
       ->check(CLI::Range(0, 3));
@@ -31,10 +31,10 @@ void ConvertFlags::AddTo(CLI::App& verb) {
       ->capture_default_str();
   verb.add_option("--max-gaussians", options.max_gaussians, "Keep at most so many, the largest by size x opacity")
       ->check(AtLeastOne());
-  verb.add_option(
-          "--coords", axes,
-          "Axes of files that break the rule of their format, as IN:OUT. RUB: is a PLY with y up, RFU: one with "
-          "z up, :RDF writes an SPZ without turning it")
+  verb.add_option("--coords", axes,
+                  "Axes of files that differ from their format's, as IN:OUT. RUB: reads a PLY with y up, RFU: one with "
+                  "z up, :RDF writes an SPZ without turning it")
+      ->type_name("AXES")
       ->check(NotEmpty());
   verb.add_option("--scales", scales, "How the input stores scales, if not as its format requires")
       ->check(CLI::IsMember({"logarithms", "lengths"}))

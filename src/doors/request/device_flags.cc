@@ -14,6 +14,7 @@ void DeviceFlags::AddTo(CLI::App& verb) {
           "Rasterize on cpu, gpu (the first usable one), auto (a hardware GPU, else the CPU) or adapter number N "
           "(listed by "
           "`doctor`)")
+      ->type_name("DEVICE")
       ->check(CLI::Validator(
           [](const std::string& word) {
             const auto choice = ParseDeviceChoice(word);

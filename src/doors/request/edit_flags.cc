@@ -16,7 +16,7 @@ void EditFlags::AddTo(CLI::App& on) {
   const std::string group = "Edits, applied in the order given";
   for (const ActionName& action : ActionNames()) {
     const std::string names(action.options), help(action.help);
-    // Nothing is bound: their words are read with their places, once all are known.
+    // Not bound to variables: ActionsAmongPaths reads values and positions after parsing.
     CLI::Option* const option = !action.form.empty()
                                     ? on.add_option(names, CLI::callback_t(), help)
                                           ->type_size(1)
@@ -30,6 +30,7 @@ void EditFlags::AddTo(CLI::App& on) {
   axes_option = on.add_option("--action-axes", axes,
                               "Axes of the edits' numbers. LUF: x left, y up, z forward, as in splat-transform. "
                               "RDF: as in info, --region and --target")
+                    ->type_name("AXES")
                     ->check(NotEmpty())
                     ->capture_default_str()
                     ->group(group);

@@ -56,7 +56,7 @@ Result<Shuffles> ParseShuffles(const std::string& text) {
                    "' is neither 'identity', nor a seed, nor five permutations such as 1230,0321,1023,3102,0321")};
 }
 
-// Of networks.
+// Options of networks.
 Status FinishModelOptions(const EnhanceFlags& flags, ModelSettings& model) {
   model.file = flags.model_file;
   model.options.upstream = flags.compat == "upstream";
@@ -73,7 +73,7 @@ std::string MethodHelp() {
 
 void AddMethodFlags(CLI::App& verb, EnhanceFlags& flags) {
   EnhanceOptions& options = flags.options;
-  verb.add_option("--method", options.method, MethodHelp())->capture_default_str();
+  verb.add_option("--method", options.method, MethodHelp())->type_name("METHOD")->capture_default_str();
   verb.add_option("--quality", options.quality,
                   "How much time to spend. fast: filter or network, about a second. good: then a short refinement, "
                   "several seconds. best: refinement against --images, or without them at the closer view's "
@@ -87,6 +87,7 @@ void AddMethodFlags(CLI::App& verb, EnhanceFlags& flags) {
       ->capture_default_str();
   verb.add_option("--region", flags.region,
                   "Enhance only this part: a box X0,Y0,Z0,X1,Y1,Z1 or a sphere X,Y,Z,RADIUS in world units")
+      ->type_name("NUMBERS")
       ->check(NotEmpty());
 }
 
@@ -96,9 +97,11 @@ void AddPixelSizeFlags(CLI::App& verb, EnhanceFlags& flags) {
   auto* cameras = verb.add_option("--cameras", flags.cameras,
                                   "Training cameras (COLMAP, transforms.json, ...): the exact pixel size of every "
                                   "Gaussian")
+                      ->type_name("PATH")
                       ->check(NotEmpty());
   verb.add_option("--pixel-size", flags.pixel_size,
                   "World size of a training pixel (depth / focal length); auto: estimate it from the splat")
+      ->type_name("LENGTH")
       ->capture_default_str()
       ->group(group);
   AddModeOption(verb, flags.mode,
@@ -125,10 +128,12 @@ void AddNetworkFlags(CLI::App& verb, EnhanceFlags& flags) {
   const std::string group = "Network";
   PublishedOptions& model = flags.options.model.options;
   verb.add_option("--model", flags.model_file, "Weights of a compact or AnchorSplat network, .safetensors or .pth")
+      ->type_name("FILE")
       ->check(NotEmpty())
       ->group(group);
   verb.add_option("--copies", flags.copies,
                   "Most Gaussians that a compact network makes of each; auto: fewer where the difference is invisible")
+      ->type_name("N")
       ->capture_default_str()
       ->group(group);
   verb.add_option("--merge-cost", flags.options.model.merge_cost,
@@ -152,7 +157,7 @@ void AddNetworkFlags(CLI::App& verb, EnhanceFlags& flags) {
       ->group(group);
 }
 
-// What the published script does otherwise than this program.
+// Differences of the published script.
 void AddPublishedScriptFlags(CLI::App& verb, EnhanceFlags& flags) {
   const std::string group = "Published network, as its script runs it";
   PublishedOptions& model = flags.options.model.options;
@@ -178,6 +183,7 @@ void AddPublishedScriptFlags(CLI::App& verb, EnhanceFlags& flags) {
       ->group(group);
   verb.add_option("--shuffles", flags.shuffles,
                   "Order of the space-filling curves: identity, a PyTorch seed, or five permutations")
+      ->type_name("ORDER")
       ->capture_default_str()
       ->group(group);
 }
@@ -192,7 +198,8 @@ void EnhanceFlags::AddTo(CLI::App& verb) {
                 "black). May remove dark parts of the object");
   verb.add_option("--background", background,
                   "Background of the training views for --clean and refinement, R,G,B from 0 to 1 (default: from the "
-                  "camera file, else the splat's comment, else black)");
+                  "camera file, else the splat's comment, else black)")
+      ->type_name("R,G,B");
   AddNetworkFlags(verb, *this);
   AddPublishedScriptFlags(verb, *this);
   AddRefineFlags(verb, options.refine, options.control);

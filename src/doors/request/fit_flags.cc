@@ -13,7 +13,7 @@ namespace {
 
 constexpr int64_t kMostSteps = int64_t{1} << 40;
 
-// An opacity of what hardly shows; of none there is nothing below.
+// A small opacity above 0.
 CLI::Validator FaintOpacity() {
   return CLI::Validator(
       [](const std::string& text) {
@@ -38,6 +38,7 @@ void AddShellFlag(CLI::App& verb, std::optional<int64_t>& count) {
   verb.add_option_function<std::string>("--shell", assign,
                                         "Gaussians on a far sphere, for sky and distant background: how many; 0: "
                                         "none; auto: some if the project's points leave much of the pictures empty")
+      ->type_name("N")
       ->check(CLI::Validator(check, ""))
       ->default_str("auto");
 }
@@ -127,6 +128,7 @@ void FitFlags::AddTo(CLI::App& verb) {
       "Where the first Gaussians are. points: the project's. view: random, where many cameras look. random: in "
       "gsplat's cube. auto: points, else view");
   verb.add_option("--init-splat", init_splat, "Start with Gaussians at the centres of this splat")
+      ->type_name("FILE")
       ->check(NotEmpty())
       ->excludes(init_option);
   verb.add_option("--init-points", init_points,
@@ -137,7 +139,8 @@ void FitFlags::AddTo(CLI::App& verb) {
       ->check(CLI::Range(1e-3, 1e3))
       ->capture_default_str();
   AddShellFlag(verb, shell);
-  verb.add_option("--background", background, "R,G,B from 0 to 1 (default: from the project, else black)");
+  verb.add_option("--background", background, "R,G,B from 0 to 1 (default: from the project, else black)")
+      ->type_name("R,G,B");
   verb.add_option("--sh-degree", standard.objective.render.sh_degree, "Highest degree of spherical harmonics")
       ->check(CLI::Range(0, kMaxShDegree))
       ->capture_default_str();
@@ -158,7 +161,9 @@ void FitFlags::AddTo(CLI::App& verb) {
   AddChoice(verb, "--profile", standard.objective.render.profile,
             {{"gsplat14", RasterProfile::kGsplat14}, {"gsplat15", RasterProfile::kGsplat15}},
             "Cut-off of a Gaussian: 3 sigma as in gsplat 1.0-1.4, or by opacity as in 1.5");
-  verb.add_option("--checkpoint", checkpoint, "File to resume from (default: OUTPUT.checkpoint)")->check(NotEmpty());
+  verb.add_option("--checkpoint", checkpoint, "File to resume from (default: OUTPUT.checkpoint)")
+      ->type_name("FILE")
+      ->check(NotEmpty());
   verb.add_option("--checkpoint-every", checkpoint_every, "Steps between checkpoints; 0: only when interrupted")
       ->check(CLI::Range(int64_t{0}, kMostSteps))
       ->capture_default_str();
@@ -169,7 +174,7 @@ void FitFlags::AddTo(CLI::App& verb) {
 
 namespace {
 
-// kBadArgument: an option was given that changes nothing beside the others.
+// kBadArgument: a given option has no effect with the others.
 Status CheckEffects(const FitFlags& flags, const FitOptions& options) {
   const DensificationOptions& d = options.densification;
   const bool mcmc = options.strategy == Strategy::kMcmc;

@@ -24,7 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The picture of a camera in the folder, by what tells the views apart ("cam0/0000"); empty: none.
+// The picture of a camera in the folder, by the view's name ("cam0/0000"); empty: none.
 Result<fs::path> FindPictureOf(const fs::path& folder, const Camera& camera, const std::string& label) {
   const fs::path place = (folder / label).parent_path();
   const PictureFolder pictures(place);
@@ -38,7 +38,7 @@ Result<fs::path> FindPictureOf(const fs::path& folder, const Camera& camera, con
   return fs::path();
 }
 
-// At most `--views` of the cameras, evenly over their order; with --truth only those that have a picture there.
+// At most `--views` cameras, evenly chosen; with --truth only those with a picture there.
 Result<std::vector<ViewerView>> ChooseViews(const PageFlags& flags, const CameraSet& cameras) {
   std::vector<ViewerView> all;
   std::vector<std::string> names;
@@ -72,23 +72,29 @@ Result<std::vector<ViewerView>> ChooseViews(const PageFlags& flags, const Camera
 }  // namespace
 
 void PageFlags::AddTo(CLI::App& verb) {
-  auto* cameras_option = verb.add_option("--cameras", cameras, "Views to jump to; the page opens at the first");
-  verb.add_option("--truth", truth, "Folder of ground-truth pictures, named as the cameras")->needs(cameras_option);
+  auto* cameras_option =
+      verb.add_option("--cameras", cameras, "Views to jump to; the page opens at the first")->type_name("PATH");
+  verb.add_option("--truth", truth, "Folder of ground-truth pictures, named as the cameras")
+      ->type_name("FOLDER")
+      ->needs(cameras_option);
   verb.add_option("--views", views, "Most cameras to use, evenly chosen")
       ->check(AtLeastOne())
       ->capture_default_str()
       ->needs(cameras_option);
   verb.add_option("--pixel-size", pixel_size,
                   "World size of a training pixel, for the scale bar; auto: estimate it from --before")
+      ->type_name("LENGTH")
       ->capture_default_str();
   verb.add_option("--sh-degree", sh_degree, "Highest degree of spherical harmonics to keep; 0 makes small pages")
       ->check(CLI::Range(0, kMaxShDegree))
       ->capture_default_str();
   AddModeOption(verb, mode, "Rasterization of both splats (default: each file's tag, else classic)");
-  verb.add_option("--background", background, "R,G,B from 0 to 1 (default: from the camera file, else black)");
+  verb.add_option("--background", background, "R,G,B from 0 to 1 (default: from the camera file, else black)")
+      ->type_name("R,G,B");
   verb.add_option("--open-your-own", open_your_own,
-                  "Add a button to open another splat, in the hosted page at this address (make web)");
-  verb.add_option("--title", title, "Heading of the page (default: the file name)");
+                  "Add a button to open another splat, in the hosted page at this address (make web)")
+      ->type_name("URL");
+  verb.add_option("--title", title, "Heading of the page (default: the file name)")->type_name("TITLE");
 }
 
 Result<ViewerPage> MakePage(const PageFlags& flags, const CameraSet* given) {
@@ -117,14 +123,14 @@ Result<ViewerPage> MakePage(const PageFlags& flags, const CameraSet* given) {
 }
 
 void LookAtSplats(ViewerPage& page) {
-  if (!page.views.empty()) {  // the first is where the page opens
+  if (!page.views.empty()) {  // the page opens at the first
     const GaussianCloud& after = *page.after.cloud;
     const std::string warning =
         EmptyPictureReason(after, page.views.front().camera, DisplayOptions(after), std::nullopt);
     if (!warning.empty()) LogWarning(warning);
   }
   if (page.pixel_size || !page.before) return;
-  // Of what was trained; what came out of it says less. A splat with too little to say gets no scale bar.
+  // From the trained splat, which gives a better estimate than the result. Without an estimate there is no scale bar.
   if (const auto reading = Read(*page.before->cloud); reading.ok()) {
     page.pixel_size = static_cast<float>(reading->pixel);
   }

@@ -11,9 +11,9 @@
 
 namespace anchorsplat {
 
-// Option values with a form of their own. Errors (kBadArgument) name the option and show the form.
+// Parsers of option values. Errors (kBadArgument) name the option and show the form.
 bool IsPngName(const std::string& path);      // *.png in any case
-bool IsPictureName(const std::string& path);  // the extension of some picture format, ours or not
+bool IsPictureName(const std::string& path);  // extension of a picture format, supported or not
 struct SizeOption {
   int width = 0;
   int height = 0;
@@ -21,20 +21,20 @@ struct SizeOption {
 Result<SizeOption> ParseSize(const std::string& option, const std::string& text);              // "1024x768"
 Result<std::array<float, 3>> ParseColor(const std::string& option, const std::string& text);   // "R,G,B", each 0–1
 Result<std::array<double, 3>> ParsePoint(const std::string& option, const std::string& text);  // "X,Y,Z"
-// A box "X0,Y0,Z0,X1,Y1,Z1" by any two corners across, or a sphere "X,Y,Z,RADIUS".
+// A box "X0,Y0,Z0,X1,Y1,Z1", by two opposite corners, or a sphere "X,Y,Z,RADIUS".
 Result<Region> ParseRegion(const std::string& option, const std::string& text);
-// "X,Y,Z", not all 0, or "x", "-z" and the like.
+// "X,Y,Z", not all 0, or an axis such as "x" or "-z".
 Result<std::array<double, 3>> ParseDirection(const std::string& option, const std::string& text);
-// A format that is read, by an extension of it with or without its dot; null for "".
+// A readable format by its extension, with or without dot; null for "".
 Result<const SplatFormat*> ParseInputFormat(const std::string& option, const std::string& text);
 inline constexpr const char* kInputFormatHelp =
-    "Format of the input, by its extension, if neither name nor content shows it (.splat from a pipe)";
-// "2G", "500M", "0.5G", "1GiB" or bytes as a number. kBadArgument: none, or less than kLeastMemory.
+    "Extension of the input's format, if neither name nor content shows it (.splat from a pipe)";
+// "2G", "500M", "0.5G", "1GiB" or a number of bytes. kBadArgument: invalid, or below kLeastMemory.
 Result<uint64_t> ParseMemory(const std::string& text);
 inline constexpr uint64_t kLeastMemory = 64'000'000;  // bytes
-// A whole number of at least 1, or nothing for "auto".
+// A whole number of at least 1; unset for "auto".
 Result<std::optional<int64_t>> ParseCopies(const std::string& option, const std::string& text);
-// A positive number, or nothing for "auto".
+// A positive number; unset for "auto".
 Result<std::optional<double>> ParsePixelSize(const std::string& option, const std::string& text);
 
 }  // namespace anchorsplat

@@ -11,12 +11,14 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
   verb.add_option_function<std::string>(
           "--images", path(options.images),
           "Project with the training pictures (as for `fit`): the best reference for refinement")
+      ->type_name("PROJECT")
       ->check(NotEmpty())
       ->group(group);
   verb.add_option_function<std::string>(
           "--enlarge-with", path(options.enlarge_with),
           "With --method detail: network that adds detail to the reference, a .safetensors of "
           "scripts/fetch-upscaler.sh")
+      ->type_name("FILE")
       ->check(NotEmpty())
       ->group(group);
   verb.add_option("--hold-out", options.hold_out,
@@ -81,6 +83,7 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
   verb.add_option_function<std::string>(
           "--checkpoint", path(control.checkpoint),
           "File to resume from (default: OUTPUT.checkpoint); a network writes one only with this or --resume")
+      ->type_name("FILE")
       ->check(NotEmpty())
       ->group(group);
   verb.add_option("--checkpoint-every", control.checkpoint_every,

@@ -10,11 +10,13 @@ namespace anchorsplat {
 
 void UpscaleFlags::AddTo(CLI::App& verb) {
   verb.add_option("--network", network, "Network to use, a .safetensors of scripts/fetch-upscaler.sh")
+      ->type_name("FILE")
       ->required()
       ->check(NotEmpty());
   verb.add_option("--factor", factor, "Enlargement, a power of the network's factor (default: the network's factor)")
       ->check(CLI::Range(2, 16));
-  verb.add_option("--background", background, "R,G,B from 0 to 1 behind pictures with alpha (default: black)");
+  verb.add_option("--background", background, "R,G,B from 0 to 1 behind pictures with alpha (default: black)")
+      ->type_name("R,G,B");
   AddChoice(verb, "--alpha", alpha, {{"network", AlphaEnlargement::kNetwork}, {"bicubic", AlphaEnlargement::kBicubic}},
             "How to enlarge alpha; bicubic takes half the time and has softer edges");
 }

@@ -25,14 +25,14 @@ namespace {
 
 constexpr int kOrbitSize = 1024;
 
-// Of an orbit: what was said, what the cameras say, what the splat says, what is usual.
+// Up of an orbit: from the option, else the cameras, else the splat, else the usual axis.
 Result<std::array<double, 3>> ChooseUp(const ViewFlags& flags, const CloudView& cloud, const CameraSet& cameras) {
   if (!flags.up.empty()) return ParseDirection("--up", flags.up);
   if (const auto up = WorldUp(cameras.cameras)) return *up;
   return UpOf({cloud.comments.begin(), cloud.comments.end()}).value_or(kUsualUp);
 }
 
-// `cameras` may be none; from those that there are an orbit takes what they know about the world.
+// `cameras` may be empty; an orbit takes up and background from them.
 Result<CameraSet> OrbitViews(const ViewFlags& flags, const CloudView& cloud, const CameraSet& cameras) {
   SizeOption size{kOrbitSize, kOrbitSize};
   if (!flags.size.empty()) {
@@ -81,6 +81,7 @@ void ViewFlags::AddTo(CLI::App& verb) {
   auto* cameras_option =
       verb.add_option("--cameras", cameras,
                       "transforms.json, cameras.json, a COLMAP folder, or cameras of Metashape, OpenSfM or Bundler")
+          ->type_name("PATH")
           ->check(NotEmpty());
   auto* orbit_option =
       verb.add_option(
@@ -91,13 +92,15 @@ void ViewFlags::AddTo(CLI::App& verb) {
       verb.add_option("--radius", radius, "Orbit: distance in world units (default: the splat fills the picture)")
           ->check(Positive());
   auto* target_option =
-      verb.add_option("--target", target, "Orbit: point to look at, X,Y,Z (default: the centre of the splat)");
+      verb.add_option("--target", target, "Orbit: point to look at, X,Y,Z (default: the centre of the splat)")
+          ->type_name("X,Y,Z");
   auto* fov_option = verb.add_option("--fov", fov, "Orbit: horizontal field of view, degrees")
                          ->check(CLI::Range(1.0, 170.0))
                          ->capture_default_str();
   auto* up_option = verb.add_option("--up", up,
                                     "Orbit: up direction, X,Y,Z or an axis as in --up=-z (default: from the cameras "
                                     "or the splat's comment, else -y)")
+                        ->type_name("DIRECTION")
                         ->check(NotEmpty());
   verb.parse_complete_callback([=] {
     if (!*cameras_option || *orbit_option) return;
@@ -105,9 +108,10 @@ void ViewFlags::AddTo(CLI::App& verb) {
       if (*option) throw CLI::ExcludesError(option->get_name(), cameras_option->get_name());
     }
   });
-  verb.add_option("--view", view, "Only the view with this name");
-  verb.add_option("--size", size, "WxH in pixels (default: as the cameras; orbit: 1024x1024)");
-  verb.add_option("--background", background, "R,G,B from 0 to 1 (default: from the camera file, else black)");
+  verb.add_option("--view", view, "Only the view with this name")->type_name("NAME");
+  verb.add_option("--size", size, "WxH in pixels (default: as the cameras; orbit: 1024x1024)")->type_name("WxH");
+  verb.add_option("--background", background, "R,G,B from 0 to 1 (default: from the camera file, else black)")
+      ->type_name("R,G,B");
   verb.add_option("--near", near_plane,
                   "Near plane, world units (default: 0.01, or 1/1000 of the distance to the splat if that is less)");
   verb.add_option("--far", far_plane, "Far plane, world units (default: none)");
@@ -159,7 +163,7 @@ Result<RenderOptions> MakeRenderOptions(const ViewFlags& flags, const CloudView&
   }
   if (flags.near_plane) {
     options.near_plane = static_cast<float>(*flags.near_plane);
-    options.subject.reset();  // as it was said
+    options.subject.reset();  // the option overrides it
   }
   if (flags.far_plane) options.far_plane = static_cast<float>(*flags.far_plane);
   if (flags.near_plane && !(options.far_plane > options.near_plane)) {

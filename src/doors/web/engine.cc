@@ -51,8 +51,8 @@ struct Engine::Answer {
 
 namespace {
 
-// Options of a verb, with `flags.AddTo`; returns those that were given. Cameras that are open stand for the file that
-// --cameras names.
+// Parses options of a verb, declared by `flags.AddTo`; returns the given ones. Open cameras replace the file of
+// --cameras.
 template <typename Flags>
 Result<std::vector<std::string>> ReadWords(const Json& request, Flags& flags, const CameraSet* cameras = nullptr) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<std::string> words, WordsOf(request));
@@ -72,10 +72,10 @@ Result<std::optional<RenderMode>> ModeOf(const Json& request) {
   const std::string name = TextOf(request, "render_mode");
   if (name.empty()) return std::optional<RenderMode>();
   if (const std::optional<RenderMode> mode = RenderModeNamed(name)) return mode;
-  return BadRequest("says a 'render_mode' that is none of classic, antialiased, mip");
+  return BadRequest("has a 'render_mode' other than classic, antialiased or mip");
 }
 
-// Messages of a call are its answer's; progress goes on at once.
+// Collects messages for the answer of a call; passes progress on at once.
 class CallSink : public LogSink {
  public:
   explicit CallSink(const ProgressListener& listener) : listener_(listener) {}
@@ -115,7 +115,7 @@ Json Described(const GaussianCloud& cloud) {
           {"origin", cloud.origin}};
 }
 
-// Removes what was put there when it goes.
+// Removes its content on destruction.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
@@ -151,7 +151,7 @@ Result<CameraSet> OfOneSize(CameraSet set) {
     const Pinhole &first = set.cameras.front().intrinsics, &k = camera.intrinsics;
     if (k.width == first.width && k.height == first.height) continue;
     return Error{ErrorCode::kBadArgument, Cat("cameras ", set.cameras.front().name, " and ", camera.name,
-                                              " have different sizes and cannot be one array: say --size or --view")};
+                                              " have different sizes and cannot be one array: pass --size or --view")};
   }
   return set;
 }
@@ -181,14 +181,14 @@ Reply Engine::Call(std::string_view request, std::span<const std::byte> data) {
         fail(answer.error());
       }
     } else {
-      fail(BadRequest("is no JSON object"));
+      fail(BadRequest("is not a JSON object"));
     }
   } catch (const std::bad_alloc&) {
-    fail({ErrorCode::kIo, "there is not enough memory for this splat"});
-  } catch (const std::length_error&) {  // an array of more than this machine can count
-    fail({ErrorCode::kIo, "there is not enough memory for this splat"});
+    fail({ErrorCode::kIo, "not enough memory for this splat"});
+  } catch (const std::length_error&) {  // an array too large for this machine
+    fail({ErrorCode::kIo, "not enough memory for this splat"});
   } catch (const std::exception& error) {
-    fail({ErrorCode::kIo, Cat("an error that should not be: ", error.what())});
+    fail({ErrorCode::kIo, Cat("unexpected failure: ", error.what())});
   }
   json["messages"] = sink->TakeMessages();
   reply.json = json.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -219,7 +219,7 @@ Result<Engine::Answer> Engine::Run(const Json& request, std::span<const std::byt
     }
     return answer;
   }
-  return BadRequest(Cat("has a verb that there is not: '", Printable(verb), "'"));
+  return BadRequest(Cat("has an unknown verb '", Printable(verb), "'"));
 }
 
 Engine::Answer Engine::Keep(OpenCloud open) {
@@ -235,7 +235,7 @@ Result<Engine::OpenCloud*> Engine::FindCloud(const Json& request, const char* ke
   ANCHORSPLAT_ASSIGN_OR_RETURN(const int64_t number, NumberOf(request, key, last_));
   const auto found = clouds_.find(number);
   if (found != clouds_.end()) return found->second.get();
-  return BadRequest(Cat("names no splat that is open as its '", key, "'"));
+  return BadRequest(Cat("names no open splat as '", key, "'"));
 }
 
 Result<const CameraSet*> Engine::FindCameras(const Json& request) {
@@ -243,7 +243,7 @@ Result<const CameraSet*> Engine::FindCameras(const Json& request) {
   if (Find(request, "cameras") == nullptr) return none;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const int64_t number, NumberOf(request, "cameras", last_));
   const auto found = cameras_.find(number);
-  if (found == cameras_.end()) return BadRequest("names no cameras that are open");
+  if (found == cameras_.end()) return BadRequest("names no open cameras");
   const CameraSet* const cameras = &found->second;
   return cameras;
 }
@@ -271,8 +271,8 @@ Result<Engine::Answer> Engine::Put(const Json& request, std::span<const std::byt
   ANCHORSPLAT_ASSIGN_OR_RETURN(const int64_t degree, NumberOf(request, "sh_degree", kMaxShDegree));
   const int64_t floats = count * (11 + 3 * ShCoefficients(static_cast<int>(degree)));
   if (data.size() % sizeof(float) != 0 || static_cast<uint64_t>(floats) != data.size() / sizeof(float)) {
-    return BadRequest(Cat("promises ", count, " Gaussians of SH degree ", degree, ", which are ", 4 * floats,
-                          " bytes, and has ", data.size()));
+    return BadRequest(Cat("lists ", count, " Gaussians of SH degree ", degree, ", which need ", 4 * floats,
+                          " bytes, but has ", data.size()));
   }
   OpenCloud open;
   ANCHORSPLAT_ASSIGN_OR_RETURN(open.cloud.render_mode, ModeOf(request));
@@ -280,7 +280,7 @@ Result<Engine::Answer> Engine::Put(const Json& request, std::span<const std::byt
   if (const Json* const origin = Find(request, "origin")) {
     const bool is_point = origin->is_array() && origin->size() == 3 &&
                           std::ranges::all_of(*origin, [](const Json& x) { return x.is_number(); });
-    if (!is_point) return BadRequest("says an 'origin' that is not three numbers");
+    if (!is_point) return BadRequest("has an 'origin' that is not three numbers");
     open.cloud.origin = origin->get<WorldOrigin>();
   }
   open.cloud.Resize(count, static_cast<int>(degree));
@@ -348,7 +348,7 @@ Result<Engine::Answer> Engine::Filter(const Json& request) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenCloud* const open, FindCloud(request, "cloud"));
   const Json* const value = Find(request, "upscale");
   const double upscale = value != nullptr && value->is_number() ? value->get<double>() : 4;
-  if (!(upscale >= 1 && upscale <= 1e6)) return BadRequest("says an 'upscale' that is not from 1 to 1000000");
+  if (!(upscale >= 1 && upscale <= 1e6)) return BadRequest("has an 'upscale' that is not from 1 to 1000000");
   const GaussianCloud& cloud = open->cloud;
   const auto reading = IsMarkedFullWidth(cloud) ? Result<Reading>(Error{}) : Read(cloud);
   const Treatment treatment = reading.ok() ? Treat(*reading, {.mode = cloud.render_mode}) : Treatment{};
@@ -446,27 +446,27 @@ Result<Engine::Answer> Engine::Columns(const Json& request) {
 
 Result<Engine::Answer> Engine::ReadCameraFiles(const Json& request, std::span<const std::byte> data) {
   const TemporaryFolder folder;
-  if (folder.path().empty()) return Error{ErrorCode::kIo, "there is no place for temporary files"};
+  if (folder.path().empty()) return Error{ErrorCode::kIo, "cannot create temporary files"};
   const Json* const files = Find(request, "files");
   if (files == nullptr || !files->is_array() || files->empty()) return BadRequest("has no list of 'files'");
   uint64_t at = 0;
   std::string only;
   for (const Json& file : *files) {
-    if (!file.is_object()) return BadRequest("has something in 'files' that is no object");
+    if (!file.is_object()) return BadRequest("has a value in 'files' that is not an object");
     const std::string name = TextOf(file, "name");
-    if (!IsPlain(name)) return BadRequest(Cat("has a file with the name '", Printable(name), "'"));
+    if (!IsPlain(name)) return BadRequest(Cat("has a file with the invalid name '", Printable(name), "'"));
     ANCHORSPLAT_ASSIGN_OR_RETURN(const int64_t bytes, NumberOf(file, "bytes", int64_t{1} << 40));
-    if (static_cast<uint64_t>(bytes) > data.size() - at) return BadRequest("promises more bytes of files than it has");
+    if (static_cast<uint64_t>(bytes) > data.size() - at) return BadRequest("lists more bytes of files than it has");
     std::ofstream out(folder.path() / name, std::ios::binary);
     out.write(reinterpret_cast<const char*>(data.data() + at), static_cast<std::streamsize>(bytes));
     out.close();
-    if (!out) return Error{ErrorCode::kIo, Cat(Printable(name), ": there is no place for it")};
+    if (!out) return Error{ErrorCode::kIo, Cat(Printable(name), ": no room to write it")};
     at += static_cast<uint64_t>(bytes);
     only = name;
   }
   const std::filesystem::path path = files->size() == 1 ? folder.path() / only : folder.path();
   auto cameras = ReadCameras(path);
-  if (!cameras.ok()) {  // what the caller called it, not where it lay
+  if (!cameras.ok()) {  // use the caller's name instead of the temporary path
     Error error = cameras.error();
     const std::string prefix = folder.path().string() + "/";
     if (const size_t found = error.message.find(prefix); found != std::string::npos) {

@@ -19,11 +19,11 @@ std::string TextOf(const Json& request, const char* key) {
 Result<int64_t> NumberOf(const Json& request, const char* key, int64_t most) {
   const Json* const value = Find(request, key);
   if (value == nullptr) return int64_t{0};
-  if (!value->is_number()) return BadRequest(Cat("says a '", key, "' that is no number"));
+  if (!value->is_number()) return BadRequest(Cat("has a '", key, "' that is not a number"));
   const auto number = value->get<double>();
   if (!(number >= 0 && number <= static_cast<double>(most)) ||
       number != static_cast<double>(static_cast<int64_t>(number))) {
-    return BadRequest(Cat("says a '", key, "' that is not a whole number from 0 to ", most));
+    return BadRequest(Cat("has a '", key, "' that is not a whole number from 0 to ", most));
   }
   return static_cast<int64_t>(number);
 }
@@ -32,9 +32,9 @@ Result<std::vector<std::string>> WordsOf(const Json& request, const char* key) {
   std::vector<std::string> words;
   const Json* const list = Find(request, key);
   if (list == nullptr) return words;
-  if (!list->is_array()) return BadRequest(Cat("says '", key, "' that are no list"));
+  if (!list->is_array()) return BadRequest(Cat("has a '", key, "' that is not a list"));
   for (const Json& word : *list) {
-    if (!word.is_string()) return BadRequest(Cat("has something in '", key, "' that is no text"));
+    if (!word.is_string()) return BadRequest(Cat("has a value in '", key, "' that is not text"));
     words.push_back(word.get<std::string>());
   }
   return words;

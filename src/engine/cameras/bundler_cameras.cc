@@ -78,7 +78,7 @@ Result<std::vector<BundlerCamera>> BundlerCameras(BundlerText& text) {
   ANCHORSPLAT_RETURN_IF_ERROR(text.Take("the number of cameras", count));
   ANCHORSPLAT_RETURN_IF_ERROR(text.Take("the number of points", points));
   if (count > text.left() / (2 * kNumbersPerCamera - 1)) {
-    return text.Complain(Cat("promises ", count, " cameras, more than the file has bytes for"));
+    return text.Complain(Cat("has too few bytes for the ", count, " cameras in its header"));
   }
   std::vector<BundlerCamera> cameras(count);
   for (BundlerCamera& camera : cameras) {
@@ -140,7 +140,7 @@ Result<std::vector<std::string>> ReadList(const std::filesystem::path& list) {
   }
   for (const std::string& name : names) {
     if (ViewName(name).empty() || name.find('\0') != std::string::npos) {
-      return Error{ErrorCode::kBadFile, Cat(list.string(), ": a line that is no path of a picture")};
+      return Error{ErrorCode::kBadFile, Cat(list.string(), ": contains a line that is not a picture path")};
     }
   }
   return names;
@@ -160,13 +160,14 @@ Result<CameraSet> CamerasFromBundler(const std::filesystem::path& file, std::str
   const std::vector<std::filesystem::path> lists = Lists(file);
   const auto list = std::ranges::find_if(lists, IsFile);
   if (list == lists.end()) {
-    return Error{ErrorCode::kNotFound, Cat(file.string(), ": the list of its pictures is missing: expected ",
-                                           lists.front().string(), ", a line with a path for each camera")};
+    return Error{ErrorCode::kNotFound, Cat(file.string(), ": picture list not found: expected ", lists.front().string(),
+                                           " with one picture path per line, one line per camera")};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<std::string> names, ReadList(*list));
   if (names.size() != cameras.size()) {
-    return Error{ErrorCode::kBadFile, Cat(list->string(), ": lists ", names.size(), " pictures, and ", file.string(),
-                                          " has ", cameras.size(), " cameras; their order alone says which is whose")};
+    return Error{ErrorCode::kBadFile,
+                 Cat(list->string(), ": lists ", names.size(), " pictures, but ", file.string(), " has ",
+                     cameras.size(), " cameras; they are matched by order, so the counts must agree")};
   }
   const std::vector<FoundPicture> pictures =
       FindPictures({.folders = FoldersOfPictures(list->parent_path()), .project = list->parent_path()}, names);
@@ -202,19 +203,20 @@ Result<CameraSet> CamerasFromBundler(const std::filesystem::path& file, std::str
     view.photograph.mask = pictures[i].mask;
     set.cameras.push_back(std::move(view));
   }
-  if (registered == 0) return Error{ErrorCode::kBadFile, Cat(file.string(), ": none of its cameras is registered")};
+  if (registered == 0)
+    return Error{ErrorCode::kBadFile, Cat(file.string(), ": no camera is registered (every focal length is 0)")};
   if (set.cameras.empty()) {
     return Error{ErrorCode::kNotFound,
-                 Cat(Printable(first_missing, 400), ": no such picture, and none of the other ", registered - 1,
-                     " cameras in ", file.string(), " has one; their sizes are in the pictures alone")};
+                 Cat(Printable(first_missing, 400), ": picture not found, nor any other picture of ", file.string(),
+                     "; the camera sizes are taken from the pictures")};
   }
   if (registered < cameras.size()) {
     LogInfo(Cat(file.string(), ": ", cameras.size() - registered, " of ", cameras.size(),
-                " cameras are not registered (focal length 0) and left out"));
+                " cameras skipped: not registered (focal length 0)"));
   }
   if (set.cameras.size() < registered) {
     LogWarning(Cat(file.string(), ": ", registered - set.cameras.size(), " of ", registered,
-                   " cameras are left out: their pictures, which alone know their size, are missing; the first is ",
+                   " cameras skipped: their pictures, needed for the image size, are missing; the first is ",
                    Printable(first_missing, 400)));
   }
   return set;

@@ -73,7 +73,7 @@ TEST(Bundler, ListsOfOtherPrograms) {
     auto set = ReadCameras(folder / bundle);
     ASSERT_FALSE(set.ok());
     EXPECT_EQ(set.error().code, ErrorCode::kNotFound);
-    EXPECT_NE(set.error().message.find("list of its pictures is missing"), std::string::npos) << set.error().message;
+    EXPECT_NE(set.error().message.find("picture list not found"), std::string::npos) << set.error().message;
     WriteText(folder / list, "images/a.png\nb.png\n");
     for (const auto& path : {folder / bundle, folder.path()}) {
       set = ReadCameras(path);
@@ -101,7 +101,7 @@ TEST(Bundler, WhatIsLeftOutIsCounted) {
   ASSERT_EQ(messages.notes().size(), 1u);
   EXPECT_NE(messages.notes()[0].find("1 of 3 cameras are not registered"), std::string::npos) << messages.notes()[0];
   ASSERT_EQ(messages.warnings().size(), 1u);
-  EXPECT_NE(messages.warnings()[0].find("1 of 2 cameras are left out"), std::string::npos) << messages.warnings()[0];
+  EXPECT_NE(messages.warnings()[0].find("1 of 2 cameras skipped"), std::string::npos) << messages.warnings()[0];
   std::filesystem::remove(folder / "a.png");
   set = ReadCameras(folder.path());
   ASSERT_FALSE(set.ok());
@@ -126,7 +126,7 @@ TEST(Bundler, MalformedFilesSayWhatIsWrong) {
   };
   const std::pair<std::pair<std::string, std::string>, const char*> cases[] = {
       {{changed("v0.3", "v0.1"), list}, "line 1: expected \"# Bundle file v0.3\""},
-      {{changed("\n1 1\n", "\n99999999999999 1\n"), list}, "more than the file has bytes for"},
+      {{changed("\n1 1\n", "\n99999999999999 1\n"), list}, "has too few bytes for"},
       {{changed("\n1 1\n", "\n-1 1\n"), list}, "line 2: expected the number of cameras"},
       {{changed("70 -0.1", "nan -0.1"), list}, "line 3: expected a focal length, found \"nan\""},
       {{changed("70 -0.1", "-70 -0.1"), list}, "focal length -70"},
@@ -135,8 +135,8 @@ TEST(Bundler, MalformedFilesSayWhatIsWrong) {
       {{good.substr(0, 60), list}, "ends before"},
       {{good, "a.png\nb.png\n"}, "lists 2 pictures"},
       {{good, ""}, "lists 0 pictures"},
-      {{good, std::string("a\0b\n", 4)}, "no path of a picture"},
-      {{changed("70 -0.1 0.02", "0 0 0"), list}, "none of its cameras is registered"},
+      {{good, std::string("a\0b\n", 4)}, "not a picture path"},
+      {{changed("70 -0.1 0.02", "0 0 0"), list}, "no camera is registered"},
   };
   for (const auto& [texts, expected] : cases) {
     const auto set = read(texts.first, texts.second);

@@ -12,7 +12,7 @@ namespace {
 
 using Vec3 = std::array<double, 3>;
 
-constexpr const char* kRemedy = R"(write "camera_axes": "opencv" beside its "frames")";
+constexpr const char* kRemedy = R"(add "camera_axes": "opencv" next to its "frames")";
 
 double Dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
@@ -111,8 +111,7 @@ std::string WrongAxes(const CameraSet& set, std::span<const float> points) {
     if (!AllLookAway(set.cameras) || IsUprightInZ(set.cameras)) return "";
     return Cat(
         "all ", set.cameras.size(),
-        " cameras look away from the middle between them; if they should look at it, the file has OpenCV's axes: ",
-        kRemedy);
+        " cameras face away from their common centre. If they should face it, the file uses OpenCV axes: ", kRemedy);
   }
   // Indoors, cameras facing outwards see less of the room than when turned around, but they do see some of it.
   constexpr double kEnough = 0.05, kClear = 5, kSome = 0.01;
@@ -120,8 +119,8 @@ std::string WrongAxes(const CameraSet& set, std::span<const float> points) {
   if (seen.turned < kEnough || seen.turned < kClear * seen.read) return "";
   if (seen.read > kSome && IsUprightInZ(set.cameras)) return "";
   const auto percent = [](double part) { return Cat(Fixed(100 * part, 0), " %"); };
-  return Cat("the cameras see ", percent(seen.read), " of the scene and would see ", percent(seen.turned),
-             " looking the other way; if the file has OpenCV's axes, ", kRemedy);
+  return Cat("the cameras see ", percent(seen.read), " of the scene, but would see ", percent(seen.turned),
+             " if they faced the other way. If the file uses OpenCV axes, ", kRemedy);
 }
 
 }  // namespace anchorsplat

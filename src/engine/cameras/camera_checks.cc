@@ -66,7 +66,7 @@ void QuaternionNorms::Add(const std::array<double, 4>& quaternion) {
 void QuaternionNorms::Report(const std::filesystem::path& file) const {
   if (off_norm_ == 0) return;
   LogWarning(Cat(file.string(), ": ", off_norm_, off_norm_ == 1 ? " quaternion is" : " quaternions are",
-                 " not of norm 1 (the farthest has ", farthest_, "); only the direction was taken"));
+                 " not of norm 1 (worst: ", farthest_, "); normalised"));
 }
 
 std::string ViewName(const std::string& image_path) {

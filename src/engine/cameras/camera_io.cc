@@ -33,8 +33,9 @@ constexpr uint64_t kMostCameraBytes = uint64_t{256} << 20;
 constexpr size_t kHeadBytes = 4096;
 
 std::string NotOfNerfstudio(const std::filesystem::path& frame) {
-  return Cat("nerfstudio trains with a transforms.json or a COLMAP model, so ", frame.string(),
-             " says nothing of these cameras; give those that it was trained with, or move that file away");
+  return Cat(frame.string(),
+             " applies only to a transforms.json or a COLMAP model; pass the cameras that nerfstudio trained on, or "
+             "move that file away");
 }
 
 // `complete`: see CamerasFromTransforms. `frame`: a dataparser_transforms.json to apply; empty: cameras stay in the
@@ -151,8 +152,8 @@ void TellOfOtherModels(const std::filesystem::path& project, std::span<const Fou
     others += Cat(others.empty() ? "" : ", ", model.folder.string(), " (", pictures(model.pictures), ")");
   }
   const std::string text =
-      Cat(project.string(), ": of ", models.size(), " COLMAP models ", models[0].folder.string(), " is used (",
-          pictures(models[0].pictures), "); to use another, name its folder: ", others);
+      Cat(project.string(), ": using ", models[0].folder.string(), " (", pictures(models[0].pictures), "), one of ",
+          models.size(), " COLMAP models. To use another, pass its folder: ", others);
   if (std::ranges::any_of(models, [&](const auto& model) { return model.pictures != models[0].pictures; })) {
     LogWarning(text);
   } else {
@@ -189,15 +190,16 @@ Result<CameraSet> ReadCameraFolder(const std::filesystem::path& folder, std::fil
     return Error{
         ErrorCode::kNotFound,
         Cat(folder.string(),
-            ": no cameras here: expected transforms.json, cameras.json, poses_bounds.npy, Metashape's XML, "
-            "OpenSfM's reconstruction.json, Bundler's bundle.out or a COLMAP model (cameras and images as .bin "
+            ": no cameras here: expected transforms.json, cameras.json, poses_bounds.npy, Metashape XML, "
+            "OpenSfM's reconstruction.json, Bundler's bundle.out, or a COLMAP model (cameras and images as .bin "
             "or .txt, also in sparse/0 or sparse)",
             foreign.empty() ? "" : "; ", foreign)};
   }
   if (candidates.size() > 1) {
     std::string list;
     for (const auto& candidate : candidates) list += (list.empty() ? "" : ", ") + candidate.string();
-    return Error{ErrorCode::kBadArgument, Cat(folder.string(), ": several sets of cameras, name one of them: ", list)};
+    return Error{ErrorCode::kBadArgument,
+                 Cat(folder.string(), ": contains several camera files; pass one of them: ", list)};
   }
   if (frame.empty()) frame = candidates[0] == folder ? FrameBeside(folder, 2) : own_frame;
   if (!IsFolder(candidates[0])) return ReadCameraFile(candidates[0], frame);
@@ -235,10 +237,10 @@ void WarnOfMissingMasks(const CameraSet& set) {
   if (bare == nullptr) return;
   const std::string expected = "expected masks/NAME.EXT.png or masks/NAME.png";
   if (masked > 0) {
-    LogWarning(Cat(pictures - masked, " of ", pictures, " pictures have no mask, the first is ",
-                   Printable(bare->image.string()), ": all of their pixels count (", expected, ")"));
+    LogWarning(Cat(pictures - masked, " of ", pictures, " pictures have no mask and are used whole, the first is ",
+                   Printable(bare->image.string()), " (", expected, ")"));
   } else if (const std::filesystem::path folder = MasksBeside(bare->image); !folder.empty()) {
-    LogWarning(Cat(folder.string(), ": none of the ", pictures, " pictures has its mask there; for ",
+    LogWarning(Cat(folder.string(), ": contains no mask for any of the ", pictures, " pictures; for ",
                    Printable(bare->image.filename().string()), " ", expected));
   }
 }

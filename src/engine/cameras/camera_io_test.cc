@@ -352,7 +352,7 @@ TEST(CameraIo, WarnsOfMasksThatAreNotFound) {
   ASSERT_TRUE(WritePng(folder / "Masks/other.png", white).ok());
   auto said = warnings();
   ASSERT_EQ(said.size(), 1u);
-  EXPECT_NE(said[0].find("none of the 3 pictures has its mask there"), std::string::npos) << said[0];
+  EXPECT_NE(said[0].find("no mask for any of the 3 pictures"), std::string::npos) << said[0];
   std::filesystem::create_directories(folder / "masks");
   ASSERT_TRUE(WritePng(folder / "masks/a.png", white).ok());
   ASSERT_TRUE(WritePng(folder / "masks/b.png.png", white).ok());

@@ -119,7 +119,7 @@ Result<ColmapCameras> ReadColmapCamerasBinary(const std::filesystem::path& path)
     for (double& param : params) ANCHORSPLAT_RETURN_IF_ERROR(stream.Read(param, "a camera's parameters"));
     auto camera = CameraFromColmap(*model, width, height, params);
     if (!camera.ok()) return stream.Complain(Cat("camera ", id, ": ", camera.error().message));
-    if (!cameras.emplace(id, *std::move(camera)).second) return stream.Complain(Cat("camera ", id, " is there twice"));
+    if (!cameras.emplace(id, *std::move(camera)).second) return stream.Complain(Cat("camera ", id, " is listed twice"));
   }
   ANCHORSPLAT_RETURN_IF_ERROR(ExpectEnd(stream));
   return cameras;
@@ -174,7 +174,7 @@ Result<std::vector<ColmapPoint>> ReadColmapPointsBinary(const std::filesystem::p
     for (double& x : point.position) ANCHORSPLAT_RETURN_IF_ERROR(stream.Read(x, "a point's position"));
     for (uint8_t& c : point.color) ANCHORSPLAT_RETURN_IF_ERROR(stream.Read(c, "a point's colour"));
     ANCHORSPLAT_RETURN_IF_ERROR(stream.Read(error, "a point's error"));
-    if (!AllFinite(point.position)) return stream.Complain(Cat("point ", id, " has no finite position"));
+    if (!AllFinite(point.position)) return stream.Complain(Cat("point ", id, " has a position that is not finite"));
     ANCHORSPLAT_RETURN_IF_ERROR(stream.ReadCount(track, kTrackElement, "a point's number of images"));
     ANCHORSPLAT_RETURN_IF_ERROR(stream.Skip(track * kTrackElement));
   }

@@ -81,11 +81,11 @@ const ColmapCameraModel* FindColmapCameraModel(const std::string& name) {
 
 Result<LensedPinhole> CameraFromColmap(const ColmapCameraModel& model, uint64_t width, uint64_t height,
                                        std::span<const double> params) {
-  const std::string undistort = "; undistort the images first, e.g. colmap image_undistorter";
+  const std::string undistort = "; undistort the images first, e.g. with colmap image_undistorter";
   const std::span<const double> coefficients = params.subspan(model.focals + 2);
   if (!model.supports_distortion) {
     if (model.lens == LensModel::kFisheye) {
-      return BadModel(Cat("camera model ", model.name, " is not a lens that is known here", undistort));
+      return BadModel(Cat("camera model ", model.name, " is not supported", undistort));
     }
     for (const double coefficient : coefficients) {
       if (coefficient == 0) continue;
@@ -191,7 +191,7 @@ Result<CameraSet> ReadColmapModel(const std::filesystem::path& folder) {
 Result<std::vector<ColmapPoint>> ReadColmapPoints(const std::filesystem::path& folder) {
   if (Exists(folder / "points3D.bin")) return ReadColmapPointsBinary(folder / "points3D.bin");
   if (Exists(folder / "points3D.txt")) return ReadColmapPointsText(folder / "points3D.txt");
-  return Error{ErrorCode::kNotFound, Cat(folder.string(), ": neither points3D.bin nor points3D.txt is here")};
+  return Error{ErrorCode::kNotFound, Cat(folder.string(), ": contains neither points3D.bin nor points3D.txt")};
 }
 
 }  // namespace anchorsplat

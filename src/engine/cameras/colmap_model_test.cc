@@ -215,7 +215,7 @@ TEST(Colmap, MalformedTextSaysWhichLine) {
       {"7 PINHOLE 40 30 nan 60 21 14", image, "focal length nan"},
       {"7 PINHOLE 40 30 50 inf 21 14", image, "focal length 50, inf"},
       {"7 PINHOLE 40 30 50 60 nan 14", image, "principal point"},
-      {cameras + cameras, image, "line 2: camera 7 is there twice"},
+      {cameras + cameras, image, "line 2: camera 7 is listed twice"},
       {"", image, "image \"a.png\": camera 7 is not in the list"},
       {cameras, "", "no images"},
       {cameras, "# only comments\n", "no images"},
@@ -364,7 +364,7 @@ TEST(Colmap, QuaternionsNearNormOneAreNormalised) {
   ASSERT_TRUE(set.ok()) << set.error().message;
   EXPECT_NEAR(set->cameras[0].world_to_camera.rotation[2], 1, 1e-12);
   ASSERT_EQ(messages.warnings().size(), 1u);
-  EXPECT_NE(messages.warnings()[0].find("1 quaternion is not of norm 1 (the farthest has 1.01)"), std::string::npos)
+  EXPECT_NE(messages.warnings()[0].find("1 quaternion is not of norm 1 (worst: 1.01)"), std::string::npos)
       << messages.warnings()[0];
 }
 
@@ -442,7 +442,7 @@ TEST(ColmapPoints, MessagesNameTheLine) {
       {"11 0.5 -1 2 255 0 256 0.25\n", "line 1: expected the colour R G B, 0 to 255, found \"256\""},
       {"#\n11 0.5 -1\n", "line 2: ends before the position X Y Z"},
       {"x 0 0 0 0 0 0 0\n", "line 1: expected the point's id, found \"x\""},
-      {"3 0 nan 0 0 0 0 0\n", "line 1: point 3 has no finite position"},
+      {"3 0 nan 0 0 0 0 0\n", "line 1: point 3 has a position that is not finite"},
       {"3 0 1e400 0 0 0 0 0\n", "line 1: expected the position X Y Z, found \"1e400\""},
   };
   for (const auto& [text, expected] : cases) {

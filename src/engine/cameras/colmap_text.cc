@@ -104,7 +104,7 @@ Result<ColmapCameras> ReadColmapCamerasText(const std::filesystem::path& path) {
     if (!TakeWord(line).empty()) return lines.Complain(Cat(name, " has ", model->params, " parameters, found more"));
     auto camera = CameraFromColmap(*model, width, height, params);
     if (!camera.ok()) return lines.Complain(Cat("camera ", id, ": ", camera.error().message));
-    if (!cameras.emplace(id, *std::move(camera)).second) return lines.Complain(Cat("camera ", id, " is there twice"));
+    if (!cameras.emplace(id, *std::move(camera)).second) return lines.Complain(Cat("camera ", id, " is listed twice"));
   }
   return cameras;
 }
@@ -160,7 +160,7 @@ Result<std::vector<ColmapPoint>> ReadColmapPointsText(const std::filesystem::pat
     for (uint8_t& c : point.color) {
       ANCHORSPLAT_RETURN_IF_ERROR(TakeNumber(lines, line, "the colour R G B, 0 to 255", c));
     }
-    if (!AllFinite(point.position)) return lines.Complain(Cat("point ", id, " has no finite position"));
+    if (!AllFinite(point.position)) return lines.Complain(Cat("point ", id, " has a position that is not finite"));
     points.push_back(point);
     // The error and the track that follow are unused.
   }

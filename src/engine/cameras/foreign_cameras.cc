@@ -19,40 +19,37 @@ struct ForeignProgram {
 };
 
 constexpr const char* kFromRealityCapture =
-    "export the registration there as COLMAP, or as Bundler (bundle.out and its list)";
-constexpr const char* kByNerfstudio = "nerfstudio's ns-process-data makes a transforms.json of it";
+    "export the registration as COLMAP, or as Bundler (bundle.out and its picture list)";
+constexpr const char* kByNerfstudio = "convert it to a transforms.json with nerfstudio's ns-process-data";
 
 const std::vector<ForeignProgram>& ForeignPrograms() {
   static const std::vector<ForeignProgram> programs = {
       {{".psx", ".psz", ".psb"},
        {},
-       "a project of Metashape",
-       "export its cameras there (File > Export > Export Cameras, Agisoft XML)"},
+       "a Metashape project",
+       "export its cameras from Metashape (File > Export > Export Cameras, Agisoft XML)"},
       {{".opk"},
        {"#PhotoID", "# PhotoID", "# CoordinateSystem", "#CoordinateSystem"},
-       "Metashape's table of positions and angles, which lacks the lens",
-       "export the cameras as Agisoft XML there"},
-      {{".nvm"},
-       {"NVM_V3"},
-       "a reconstruction of VisualSFM",
-       "save it in Bundler's format there (bundle.out and list.txt)"},
-      {{".sfm", ".mg"}, {}, "a file of Meshroom", "make a COLMAP model of it (aliceVision_exportColmap)"},
-      {{".rcproj", ".rsproj", ".rcalign", ".rsalign", ".rcbox"}, {}, "a file of RealityCapture", kFromRealityCapture},
-      {{".xmp"}, {"<x:xmpmeta"}, "RealityCapture's XMP, one file for each picture", kFromRealityCapture},
-      {{}, {"#name,x,y", "#cameras", "#name;x;y"}, "RealityCapture's table of cameras", kFromRealityCapture},
+       "Metashape's table of positions and angles, without the lens",
+       "export the cameras as Agisoft XML instead"},
+      {{".nvm"}, {"NVM_V3"}, "a VisualSFM reconstruction", "save it in Bundler's format (bundle.out and list.txt)"},
+      {{".sfm", ".mg"}, {}, "a Meshroom file", "convert it to a COLMAP model with aliceVision_exportColmap"},
+      {{".rcproj", ".rsproj", ".rcalign", ".rsalign", ".rcbox"}, {}, "a RealityCapture file", kFromRealityCapture},
+      {{".xmp"}, {"<x:xmpmeta"}, "RealityCapture XMP, one file per picture", kFromRealityCapture},
+      {{}, {"#name,x,y", "#cameras", "#name;x;y"}, "a RealityCapture camera table", kFromRealityCapture},
       {{".p4d", ".opf"},
        {"fileName imageWidth imageHeight"},
-       "a file of Pix4D",
-       "export OPF there and make a COLMAP model of it (opf2colmap of pyopf)"},
-      {{".r3d"}, {}, "a capture of Record3D", kByNerfstudio},
+       "a Pix4D file",
+       "export OPF and convert it to a COLMAP model with pyopf's opf2colmap"},
+      {{".r3d"}, {}, "a Record3D capture", kByNerfstudio},
       {{".abc", ".fbx", ".usd", ".usda", ".usdc", ".usdz", ".blend"},
        {},
-       "a scene of a 3D program",
+       "a scene file of a 3D program",
        "export its cameras as transforms.json, or as a COLMAP model"},
       {{".db"},
        {"SQLite format 3"},
-       "COLMAP's database, which has no poses",
-       "give the model (cameras and images), or the project"},
+       "a COLMAP database, which has no poses",
+       "pass the model (cameras and images) or the project folder"},
   };
   return programs;
 }
@@ -80,20 +77,19 @@ std::string ForeignJson(const JsonValue& root) {
     if (root.raw().empty()) return {};
     const JsonValue first = root.Element(0);
     if (first.has("file_path") && first.has("transform")) {
-      return LooksLike("the poses that ns-export wrote, which lack the lens",
-                       "give the transforms.json that was trained with");
+      return LooksLike("poses written by ns-export, without the lens", "pass the transforms.json used for training");
     }
     return {};
   }
   if (root.has("sfm_data_version")) {
-    return LooksLike("OpenMVG's sfm_data.json", "make a COLMAP model of it (openMVG_main_openMVG2Colmap)");
+    return LooksLike("OpenMVG's sfm_data.json", "convert it to a COLMAP model with openMVG_main_openMVG2Colmap");
   }
   if (root.has("views") && root.has("intrinsics")) {
-    return LooksLike("a file of Meshroom", "make a COLMAP model of it (aliceVision_exportColmap)");
+    return LooksLike("a Meshroom file", "convert it to a COLMAP model with aliceVision_exportColmap");
   }
   if (root.has("camera_path")) {
-    return LooksLike("a camera path for nerfstudio's viewer, which is of no pictures",
-                     "give the transforms.json that was trained with");
+    return LooksLike("a camera path of nerfstudio's viewer, not training cameras",
+                     "pass the transforms.json used for training");
   }
   if (root.has("cameraPoseARFrame") || root.has("t_00") || (root.has("poses") && root.has("K"))) {
     return LooksLike("a frame of an ARKit capture", kByNerfstudio);
@@ -101,8 +97,8 @@ std::string ForeignJson(const JsonValue& root) {
   if (root.raw().is_object() && !root.raw().empty()) {
     const auto& value = root.raw().front();
     if (value.is_object() && value.contains("projection_type")) {
-      return LooksLike("the lenses of OpenSfM or OpenDroneMap, without poses",
-                       "give the reconstruction.json beside it or in the folder opensfm");
+      return LooksLike("OpenSfM or OpenDroneMap lenses, without poses",
+                       "pass the reconstruction.json beside it or in the folder opensfm");
     }
   }
   return {};

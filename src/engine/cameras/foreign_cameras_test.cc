@@ -16,10 +16,10 @@ TEST(ForeignCameras, AreNamedWithWhatToExportInstead) {
     const char *name, *text, *what, *instead;
   };
   const Case cases[] = {
-      {"scan.psx", "<document version=\"1.2.0\" path=\"{projectname}.files/project.zip\"/>", "a project of Metashape",
+      {"scan.psx", "<document version=\"1.2.0\" path=\"{projectname}.files/project.zip\"/>", "a Metashape project",
        "Agisoft XML"},
-      {"SCAN.PSZ", "PK", "a project of Metashape", "Agisoft XML"},
-      {"angles.txt", "# CoordinateSystem: LOCAL_CS\n#PhotoID, X, Y, Z, Omega, Phi, Kappa\n", "which lacks the lens",
+      {"SCAN.PSZ", "PK", "a Metashape project", "Agisoft XML"},
+      {"angles.txt", "# CoordinateSystem: LOCAL_CS\n#PhotoID, X, Y, Z, Omega, Phi, Kappa\n", "without the lens",
        "Agisoft XML"},
       {"scan.nvm", "NVM_V3 \n\n2\n", "VisualSFM", "Bundler"},
       {"renamed.txt", "NVM_V3 \n\n2\n", "VisualSFM", "Bundler"},
@@ -56,7 +56,7 @@ TEST(ForeignCameras, FoldersSayWhatIsThere) {
   const auto set = ReadCameras(folder.path());
   ASSERT_FALSE(set.ok());
   EXPECT_EQ(set.error().code, ErrorCode::kNotFound);
-  EXPECT_NE(set.error().message.find("scan.psx looks like a project of Metashape"), std::string::npos)
+  EXPECT_NE(set.error().message.find("scan.psx looks like a Metashape project"), std::string::npos)
       << set.error().message;
 }
 

@@ -138,9 +138,8 @@ Result<LensedPinhole> SensorOf(const XmlText& xml, const pugi::xml_node& sensor)
   if (type.empty()) type = sensor.attribute("type").value();
   if (type != "frame" && type != "fisheye" && !type.empty()) {
     return xml.Complain(sensor,
-                        Cat("a sensor of type ", Printable(type),
-                            " is not a lens that is known here (frame and fisheye are); its pictures have to be "
-                            "made into those of frame cameras first"));
+                        Cat("sensor type ", Printable(type),
+                            " is not supported (frame and fisheye are); convert its pictures to frame cameras first"));
   }
   if (!calibration) {
     return xml.Complain(sensor, "has no calibration; align the photos in Metashape and export the cameras again");
@@ -152,10 +151,11 @@ Result<LensedPinhole> SensorOf(const XmlText& xml, const pugi::xml_node& sensor)
   ANCHORSPLAT_ASSIGN_OR_RETURN(c.width, SideOf(xml, resolution, "width"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(c.height, SideOf(xml, resolution, "height"));
   if (!calibration.child("f")) {
-    return xml.Complain(calibration, calibration.child("fx")
-                                         ? "has fx and fy, as PhotoScan before 1.2 wrote them; export the cameras by a "
-                                           "newer version"
-                                         : "has no focal length <f>");
+    return xml.Complain(calibration,
+                        calibration.child("fx")
+                            ? "has fx and fy, as written by PhotoScan before 1.2; export the cameras with a "
+                              "newer version"
+                            : "has no focal length <f>");
   }
   std::map<std::string_view, double> number;
   for (const char* name : {"f", "cx", "cy", "b1", "b2", "k1", "k2", "k3", "k4", "p1", "p2", "p3", "p4"}) {
@@ -172,9 +172,9 @@ Result<LensedPinhole> SensorOf(const XmlText& xml, const pugi::xml_node& sensor)
   for (const char* name : {"p1", "p2", "p3", "p4"}) {
     const bool known = lens.model == LensModel::kRadial && name[1] < '3';
     if (known || number[name] == 0) continue;
-    return xml.Complain(
-        calibration, Cat("a ", lens.model == LensModel::kRadial ? "frame" : "fisheye", " lens with ", name, " = ",
-                         number[name], " is not known here; fix it at 0 in Metashape and optimize the cameras again"));
+    return xml.Complain(calibration, Cat(name, " = ", number[name], " is not supported for a ",
+                                         lens.model == LensModel::kRadial ? "frame" : "fisheye",
+                                         " lens; fix it at 0 in Metashape and optimize the cameras again"));
   }
   auto through = ThroughLens(lens, c);
   if (!through.ok()) return xml.Complain(calibration, through.error().message);
@@ -232,8 +232,8 @@ void KeepOneWorld(const XmlText& xml, const std::map<std::string, Similarity>& p
   const std::string kept = largest->first;
   LogWarning(
       Cat(xml.name(), ": ", chunk.aligned.size() - largest->second, " of ", chunk.aligned.size(),
-          " aligned cameras are left out: they belong to other components than the largest, and nothing says how "
-          "those lie to each other; merge the components in Metashape to use them all"));
+          " aligned cameras skipped: their components have no known position relative to the largest one. Merge the "
+          "components in Metashape to use all cameras"));
   std::erase_if(chunk.aligned, [&](const auto& camera) { return camera.attribute("component_id").value() != kept; });
 }
 
@@ -255,15 +255,14 @@ Result<Pose> PoseOf(const XmlText& xml, const pugi::xml_node& camera, const Simi
 void SayWhatIsLeftOut(const XmlText& xml, const std::vector<MetashapeChunk>& chunks, const MetashapeChunk& taken) {
   if (taken.not_aligned > 0) {
     LogWarning(Cat(xml.name(), ": ", taken.not_aligned, " of ",
-                   std::ssize(taken.aligned) + taken.not_aligned + taken.disabled,
-                   " cameras are left out: they are not aligned"));
+                   std::ssize(taken.aligned) + taken.not_aligned + taken.disabled, " cameras skipped: not aligned"));
   }
-  if (taken.disabled > 0) LogInfo(Cat(xml.name(), ": ", taken.disabled, " cameras are left out: they are disabled"));
+  if (taken.disabled > 0) LogInfo(Cat(xml.name(), ": ", taken.disabled, " cameras skipped: disabled"));
   for (const MetashapeChunk& chunk : chunks) {
     if (chunk.node == taken.node || chunk.aligned.empty()) continue;
     LogWarning(Cat(xml.name(), ": ", chunk.aligned.size(), " cameras of ", Named("chunk", chunk.label),
-                   " are left out: ", Named("chunk", taken.label), " has more, ", taken.aligned.size(),
-                   "; merge the chunks in Metashape, or export each by itself"));
+                   " skipped: using ", Named("chunk", taken.label), ", which has ", taken.aligned.size(),
+                   ". Merge the chunks in Metashape, or export each one separately"));
   }
 }
 
@@ -286,7 +285,7 @@ Result<CameraSet> CamerasOfChunk(const XmlText& xml, const std::vector<Metashape
   CameraSet set;
   for (const pugi::xml_node& node : chunk.aligned) {
     const std::string label = node.attribute("label").value(), sensor_id = node.attribute("sensor_id").value();
-    if (ViewName(label).empty()) return xml.Complain(node, "has no label, which is its picture's name");
+    if (ViewName(label).empty()) return xml.Complain(node, "has no label; expected the name of its picture");
     if (!known.contains(sensor_id)) {
       const auto sensor = sensors.find(sensor_id);
       if (sensor == sensors.end()) {
@@ -314,7 +313,7 @@ bool LooksLikeMetashape(std::string_view head) {
 Result<CameraSet> CamerasFromMetashape(const std::string& name, std::string_view bytes,
                                        const std::filesystem::path& folder) {
   const XmlText xml(name, bytes);
-  if (bytes.size() > kMostXmlBytes) return xml.Complain(-1, "has more than 256 MiB, too much for a file of cameras");
+  if (bytes.size() > kMostXmlBytes) return xml.Complain(-1, "is larger than 256 MiB, too large for a camera file");
   if (std::ranges::count_if(bytes, [](char c) { return c == '<' || c == '='; }) > kMostMarks) {
     return xml.Complain(-1, Cat("has more than ", WithThousands(kMostMarks), " elements and attributes"));
   }
@@ -329,9 +328,10 @@ Result<CameraSet> CamerasFromMetashape(const std::string& name, std::string_view
     chunks.push_back(std::move(chunk));
   }
   if (chunks.empty()) {
-    return xml.Complain(-1,
-                        "an XML file without a chunk: expected the cameras of Metashape (File > Export > Export "
-                        "Cameras, Agisoft XML)");
+    return xml.Complain(
+        -1,
+        "is an XML file without a chunk: expected cameras exported by Metashape (File > Export > Export "
+        "Cameras, Agisoft XML)");
   }
   const auto largest = std::ranges::max_element(chunks, {}, [](const auto& chunk) { return chunk.aligned.size(); });
   if (largest->aligned.empty()) {

@@ -129,7 +129,7 @@ TEST(Metashape, WhatIsLeftOutIsCounted) {
   ASSERT_TRUE(set.ok()) << set.error().message;
   ExpectSamePixels(set->cameras, {rig[0], rig[1]});
   ASSERT_EQ(messages.warnings().size(), 1u);
-  EXPECT_EQ(messages.warnings()[0], "cameras.xml: 1 of 4 cameras are left out: they are not aligned");
+  EXPECT_EQ(messages.warnings()[0], "cameras.xml: 1 of 4 cameras skipped: not aligned");
   ASSERT_EQ(messages.notes().size(), 1u);
   EXPECT_NE(messages.notes()[0].find("disabled"), std::string::npos);
   set = Parse(Document(Chunk(CameraElement(rig[3])) + Chunk(CameraElements({rig[0], rig[1]}))));
@@ -142,7 +142,7 @@ TEST(Metashape, WhatIsLeftOutIsCounted) {
   set = Parse(Document(Chunk(three)));
   ASSERT_TRUE(set.ok()) << set.error().message;
   ExpectSamePixels(set->cameras, {rig[0], rig[1]});
-  EXPECT_NE(messages.warnings().back().find("1 of 3 aligned cameras are left out"), std::string::npos);
+  EXPECT_NE(messages.warnings().back().find("1 of 3 aligned cameras skipped"), std::string::npos);
   const std::string still = "<transform><scale>1</scale></transform></component>";
   set = Parse(Document(
       Chunk(three, Cat("<components><component id=\"0\">", still, "<component id=\"1\">", still, "</components>"))));
@@ -179,7 +179,8 @@ TEST(Metashape, MalformedFilesSayWhatIsWrong) {
       {{"<k1>-0.1</k1>", "<p3>0.1</p3>"}, "p3 = 0.1"},
       {{"type=\"frame\" class=\"adjusted\"", "type=\"spherical\" class=\"adjusted\""}, "type spherical"},
       {{"type=\"frame\" class=\"adjusted\"", "type=\"equisolid_fisheye\" class=\"adjusted\""}, "equisolid_fisheye"},
-      {{"type=\"frame\" class=\"adjusted\"", "type=\"fisheye\" class=\"adjusted\""}, "a fisheye lens with p1"},
+      {{"type=\"frame\" class=\"adjusted\"", "type=\"fisheye\" class=\"adjusted\""},
+       "is not supported for a fisheye lens"},
       {{"class=\"adjusted\"><resolution width=\"64\"", "class=\"adjusted\"><resolution width=\"-64\""},
        "expected a width from 1"},
       {{"class=\"adjusted\"><resolution width=\"64\"", "class=\"adjusted\"><resolution width=\"99999999999\""},

@@ -94,25 +94,23 @@ Status MoveToNerfstudioFrame(const std::filesystem::path& file, const Similarity
     camera.world_to_camera = Moved(camera.world_to_camera, *set.moved);
     for (const double x : camera.world_to_camera.translation) {
       if (std::isfinite(x)) continue;
-      return Error{ErrorCode::kBadFile,
-                   Cat(file.string(), ": moves camera ", Printable(camera.name), " beyond all numbers")};
+      return Error{ErrorCode::kBadFile, Cat(file.string(), ": moves camera ", Printable(camera.name),
+                                            " so far that its position overflows")};
     }
   }
-  LogInfo(Cat(file.string(), ": the cameras are brought into the frame that nerfstudio trained in (scale ", frame.scale,
-              ")"));
+  LogInfo(Cat(file.string(), ": converted the cameras to nerfstudio's training coordinates (scale ", frame.scale, ")"));
   return {};
 }
 
 Result<std::filesystem::path> DataOfNerfstudioRun(const std::filesystem::path& folder) {
   const std::filesystem::path config = folder / "config.yml";
-  const std::string otherwise =
-      Cat("; put ", (folder / kNerfstudioFrame).string(),
-          " beside the transforms.json or COLMAP model that it was trained with, and give that");
+  const std::string otherwise = Cat("; copy ", (folder / kNerfstudioFrame).string(),
+                                    " next to the transforms.json or COLMAP model it was trained on, and pass that");
   const auto yaml = ReadFileBytes(config, kMostConfigBytes);
   if (!yaml.ok()) {
     return Error{ErrorCode::kNotFound, Cat(folder.string(),
-                                           ": a run of nerfstudio, whose cameras are elsewhere, and no "
-                                           "config.yml here says where",
+                                           ": is a nerfstudio run without a config.yml that says where its "
+                                           "cameras are",
                                            otherwise)};
   }
   const std::filesystem::path data = DataOfConfig(*yaml);
@@ -125,7 +123,7 @@ Result<std::filesystem::path> DataOfNerfstudioRun(const std::filesystem::path& f
   }
   if (Exists(data)) return data;
   return Error{ErrorCode::kNotFound, Cat(config.string(), ": the cameras were in ", Printable(data.string(), 400),
-                                         ", which is not here", otherwise)};
+                                         ", which does not exist", otherwise)};
 }
 
 }  // namespace anchorsplat

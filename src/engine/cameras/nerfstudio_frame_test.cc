@@ -89,8 +89,7 @@ TEST(NerfstudioFrame, LiesBesideTheCameras) {
     const Messages messages;
     ExpectTrained(ReadCameras(path), rig);
     ASSERT_EQ(messages.notes().size(), 1u);
-    EXPECT_NE(messages.notes()[0].find("brought into the frame that nerfstudio trained in (scale 0.25)"),
-              std::string::npos)
+    EXPECT_NE(messages.notes()[0].find("nerfstudio's training coordinates (scale 0.25)"), std::string::npos)
         << messages.notes()[0];
   }
 }
@@ -133,7 +132,7 @@ TEST(NerfstudioFrame, FolderOfARunNamesItsData) {
     ASSERT_FALSE(set.ok());
     EXPECT_EQ(set.error().code, ErrorCode::kNotFound);
     EXPECT_NE(set.error().message.find(words), std::string::npos) << set.error().message;
-    EXPECT_NE(set.error().message.find("beside the transforms.json"), std::string::npos) << set.error().message;
+    EXPECT_NE(set.error().message.find("next to the transforms.json"), std::string::npos) << set.error().message;
   };
   refused("no config.yml");
   const auto config = [&](const std::string& parts) {
@@ -145,7 +144,7 @@ TEST(NerfstudioFrame, FolderOfARunNamesItsData) {
   config("");
   refused("does not say where");
   config("- data\n- vase\n");
-  refused("data/vase, which is not here");
+  refused("data/vase, which does not exist");
   config("- data\n- 'poster'\n");
   for (const auto& path : {run, run / kNerfstudioFrame}) ExpectTrained(ReadCameras(path), rig);
   config("- data\n- poster\n- transforms.json\n");
@@ -178,13 +177,13 @@ TEST(NerfstudioFrame, BadOnesSayWhatIsWrong) {
   refused("{\"scale\": 1, \"transform\": [[1,0,0,0],[0,1,0,0]]}", "transform: expected 3 rows, found 2");
   refused("{\"scale\": 1, \"transform\": [[2,0,0,0],[0,1,0,0],[0,0,1,0]]}",
           "transform: camera matrix is not a rotation");
-  refused("{\"scale\": 1e308, \"transform\": [[1,0,0,1e308],[0,1,0,0],[0,0,1,0]]}", "beyond all numbers");
+  refused("{\"scale\": 1e308, \"transform\": [[1,0,0,1e308],[0,1,0,0],[0,0,1,0]]}", "its position overflows");
   WriteText(folder / "transforms.json", Transforms(RigForTest(1), "\"applied_transform\": [[1, 2]], "));
   refused(Frame(), "applied_transform: expected 3 rows");
   // What nerfstudio does not train with is not moved by it.
   std::filesystem::remove(folder / "transforms.json");
   WriteText(folder / "cameras.xml", "<document><chunk/></document>");
-  refused(Frame(), "nerfstudio trains with a transforms.json");
+  refused(Frame(), "applies only to a transforms.json");
 }
 
 }  // namespace

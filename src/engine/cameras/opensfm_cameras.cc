@@ -43,8 +43,8 @@ Result<LensedPinhole> ShotCamera(const JsonValue& camera) {
   } else if (type == "fisheye_opencv") {
     radial = 4;
   } else if (!one_focal && type != "radial") {
-    return camera.Complain(Cat("projection_type ", Printable(type),
-                               " is not a lens that is known here; undistort the images first (opensfm undistort)"));
+    return camera.Complain(
+        Cat("projection_type ", Printable(type), " is not supported; undistort the images first (opensfm undistort)"));
   }
   constexpr std::array<const char*, 4> kRadial = {"k1", "k2", "k3", "k4"};
   for (size_t i = 0; i < radial; ++i) {
@@ -80,7 +80,7 @@ Result<Pose> ShotPose(const JsonValue& shot) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue translation, shot.Get("translation"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> t, translation.Numbers(3));
   const double angle = std::hypot(r[0], r[1], r[2]);
-  if (!std::isfinite(angle)) return rotation.Complain("an axis that is not finite");
+  if (!std::isfinite(angle)) return rotation.Complain("is not finite");
   const double s = angle > 1e-9 ? std::sin(0.5 * angle) / angle : 0.5;
   return Pose{RotationFromQuaternion(std::cos(0.5 * angle), s * r[0], s * r[1], s * r[2]), {t[0], t[1], t[2]}};
 }
@@ -100,9 +100,9 @@ void SayOfOthers(const std::vector<JsonValue>& all, size_t taken) {
   }
   if (left_out == 0) return;
   LogWarning(all[taken]
-                 .Complain(Cat("the largest of ", all.size(), " reconstructions, with ", ShotsOf(all[taken]),
-                               " shots, is taken; left out are ", left_out, " shots (", others,
-                               "), as nothing says how those lie to it"))
+                 .Complain(Cat("using the largest of ", all.size(), " reconstructions, with ", ShotsOf(all[taken]),
+                               " shots; skipped ", left_out, " shots (", others,
+                               "), whose position relative to it is unknown"))
                  .message);
 }
 
@@ -113,7 +113,7 @@ void SayOfReference(const JsonValue& reconstruction) {
   const auto latitude = reference->Find("latitude"), longitude = reference->Find("longitude");
   if (!latitude || !longitude || !latitude->raw().is_number() || !longitude->raw().is_number()) return;
   LogInfo(reference
-              ->Complain(Cat("the world's coordinates are metres to the east, north and up of latitude ",
+              ->Complain(Cat("world coordinates are metres east, north and up from latitude ",
                              latitude->raw().get<double>(), ", longitude ", longitude->raw().get<double>()))
               .message);
 }
@@ -137,7 +137,7 @@ Result<CameraSet> CamerasFromOpenSfm(const JsonValue& root, const std::filesyste
   CameraSet set;
   for (const auto& [name, unused] : shots.raw().items()) {
     if (ViewName(name).empty() || name.find('\0') != std::string::npos) {
-      return shots.Complain("a shot without the name of a picture");
+      return shots.Complain("contains a shot without a picture name");
     }
     ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue shot, shots.Get(name.c_str()));
     ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue of, shot.Get("camera"));

@@ -97,7 +97,7 @@ TEST(OpenSfm, LargestReconstructionAndWhatElseIsThere) {
   ASSERT_TRUE(set.ok()) << set.error().message;
   ExpectSamePixels(set->cameras, {rig[0], rig[1], rig[2]});
   ASSERT_EQ(messages.warnings().size(), 1u);
-  EXPECT_NE(messages.warnings()[0].find("left out are 1 shots (1 of number 0)"), std::string::npos)
+  EXPECT_NE(messages.warnings()[0].find("skipped 1 shots (1 of number 0)"), std::string::npos)
       << messages.warnings()[0];
   ASSERT_EQ(messages.notes().size(), 1u);
   EXPECT_NE(messages.notes()[0].find("latitude 50.1, longitude 8.25"), std::string::npos) << messages.notes()[0];
@@ -133,9 +133,9 @@ TEST(OpenSfm, MalformedFilesSayWhatIsWrong) {
       {{"\"camera\": \"c\"", "\"camera\": \"d\""}, "camera \"d\" is not in the list"},
       {{"\"camera\": \"c\", ", ""}, "\"camera\" is missing"},
       {{"\"rotation\": [", "\"rotation\": [1, "}, "rotation: expected 3 numbers, found 4"},
-      {{"\"rotation\": [", "\"rotation\": [1.7e308, 1.7e308, 1.7e308], \"r\": ["}, "axis that is not finite"},
+      {{"\"rotation\": [", "\"rotation\": [1.7e308, 1.7e308, 1.7e308], \"r\": ["}, "rotation: is not finite"},
       {{"\"translation\"", "\"t\""}, "\"translation\" is missing"},
-      {{"a.png", ""}, "without the name"},
+      {{"a.png", ""}, "without a picture name"},
       {{"\"cameras\"", "\"lenses\""}, "\"cameras\" is missing"},
   };
   for (const auto& [change, expected] : cases) {

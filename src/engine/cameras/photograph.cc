@@ -37,7 +37,7 @@ Result<Buffer<uint8_t>> ReadIgnored(const std::filesystem::path& file, int width
   }
   if (!SameShape(mask.width, mask.height, width, height)) {
     return BadPicture(file, Cat("the mask has ", mask.width, "x", mask.height, " pixels, its picture ", width, "x",
-                                height, ", which is another shape"));
+                                height, ": the aspect ratios differ"));
   }
   Buffer<uint8_t> ignored(static_cast<size_t>(int64_t{width} * height));
   bool any = false;
@@ -66,7 +66,7 @@ Status MatchPhotograph(Camera& camera, int downscale) {
   if (!SameShape(size.width, size.height, distorted.width, distorted.height)) {
     if (!SwapsSides(size.orientation) || !SameShape(size.height, size.width, distorted.width, distorted.height)) {
       return BadPicture(camera.image, Cat("the picture has ", size.width, "x", size.height, " pixels, its camera ",
-                                          distorted.width, "x", distorted.height, ", which is another shape"));
+                                          distorted.width, "x", distorted.height, ": the aspect ratios differ"));
     }
     photograph.orientation = size.orientation;
     std::swap(size.width, size.height);
@@ -82,8 +82,8 @@ Status MatchPhotograph(Camera& camera, int downscale) {
   photograph.downscale = downscale;
   camera.intrinsics = downscale > 1 ? Downscaled(*undistorted, downscale) : *undistorted;
   if (camera.intrinsics.width < 1 || camera.intrinsics.height < 1) {
-    return BadPicture(camera.image, Cat("nothing is left of ", undistorted->width, "x", undistorted->height,
-                                        " pixels at 1/", downscale, " of them per side"));
+    return BadPicture(camera.image, Cat(undistorted->width, "x", undistorted->height,
+                                        " pixels are too few to downscale by ", downscale));
   }
   return {};
 }

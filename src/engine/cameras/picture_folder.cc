@@ -59,8 +59,8 @@ PictureFolder::PictureFolder(fs::path folder) : path_(std::move(folder)) {
 
 Result<std::string> PictureFolder::Find(const std::string& name) const {
   const auto ambiguous = [&](const std::string& one, const std::string& other) {
-    return Error{ErrorCode::kBadArgument, Cat("\"", Printable(name), "\" may be ", (path_ / one).string(), " or ",
-                                              (path_ / other).string(), "; rename one of them")};
+    return Error{ErrorCode::kBadArgument, Cat("\"", Printable(name), "\" matches both ", (path_ / one).string(),
+                                              " and ", (path_ / other).string(), "; rename one of them")};
   };
   if (const auto found = by_name_.find(NameKey(name)); found != by_name_.end()) {
     const auto& names = found->second;

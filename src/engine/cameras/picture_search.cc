@@ -280,16 +280,16 @@ class Search {
     std::ranges::sort(ranked);
     if (ranked.size() > 1 && std::get<0>(ranked[0]) == std::get<0>(ranked[1]) &&
         std::get<1>(ranked[0]) == std::get<1>(ranked[1])) {
-      const std::string ambiguity = Cat("the picture \"", Printable(raw_[group[0]]), "\" and those with it may be in ",
-                                        std::get<2>(ranked[0]).string(), " or in ", std::get<2>(ranked[1]).string(),
-                                        "; move one of these folders away");
+      const std::string ambiguity =
+          Cat("the picture \"", Printable(raw_[group[0]]), "\" and others may be in ", std::get<2>(ranked[0]).string(),
+              " or in ", std::get<2>(ranked[1]).string(), "; move one of these folders away");
       for (const size_t i : group) found_[i].ambiguity = ambiguity;
       return;
     }
     const auto& [common, rank, path, folder] = ranked[0];
     if (common == 0 && rank > kUsualRank && !told_) {
       told_ = true;
-      LogInfo(Cat(Printable(raw_[group[0]]), " is not where the file of the cameras says; taken from ", path.string()));
+      LogInfo(Cat(Printable(raw_[group[0]]), " is not where the camera file says; found in ", path.string()));
     }
     TakeFrom(*folder, group, static_cast<size_t>(-common));
   }

@@ -55,14 +55,14 @@ Result<NumpyArray> ReadHeader(const std::string& name, std::string_view bytes) {
   const bool wide = byte(6) >= 2;
   const size_t length = byte(8) | byte(9) << 8 | (wide ? byte(10) << 16 | byte(11) << 24 : 0);
   array.begin = (wide ? 12 : 10) + length;
-  if (array.begin > bytes.size()) return bad(8, Cat("a header of ", length, " bytes, which the file has not"));
+  if (array.begin > bytes.size()) return bad(8, Cat("a header of ", length, " bytes that ends beyond the file"));
   const std::string_view header = bytes.substr(wide ? 12 : 10, length);
   const std::string_view type = ValueOf(header, "descr"), order = ValueOf(header, "fortran_order");
   if (type.size() < 5 || type[0] != '\'' || type[2] != 'f' || (type[3] != '8' && type[3] != '4') || type[4] != '\'') {
     return bad(10, Cat("expected 'descr' of doubles ('<f8') or floats, found ", Printable(std::string(type), 12)));
   }
   array.item = type[3] - '0';
-  if (type[1] != '<' && type[1] != '>' && type[1] != '=') return bad(10, "unknown order of bytes");
+  if (type[1] != '<' && type[1] != '>' && type[1] != '=') return bad(10, "unknown byte order");
   array.swapped = (type[1] == '>') != (std::endian::native == std::endian::big);
   array.column_major = order.starts_with("True");
   const std::string_view shape = ValueOf(header, "shape");
@@ -83,7 +83,7 @@ Result<NumpyArray> ReadHeader(const std::string& name, std::string_view bytes) {
   }
   const uint64_t available = (bytes.size() - array.begin) / (kRow * static_cast<uint64_t>(array.item));
   if (array.rows > available) {
-    return bad(array.begin, Cat("an array of ", array.rows, " views, but there are bytes for ", available));
+    return bad(array.begin, Cat("an array of ", array.rows, " views, but the file ends after ", available));
   }
   return array;
 }
@@ -152,8 +152,8 @@ Result<CameraSet> ParsePosesBounds(const std::string& name, std::string_view byt
   if (array.rows == 0) return Error{ErrorCode::kBadFile, Cat(name, ": no views")};
   if (!pictures.empty() && pictures.size() != array.rows) {
     return Error{ErrorCode::kBadFile,
-                 Cat(name, ": has ", array.rows, " views, and ", pictures.front().parent_path().string(), " ",
-                     pictures.size(), " pictures; their order alone says which is whose")};
+                 Cat(name, ": has ", array.rows, " views, but ", pictures.front().parent_path().string(), " has ",
+                     pictures.size(), " pictures; they are matched by order, so the counts must agree")};
   }
   CameraSet set;
   set.source = CameraSource::kLlff;

@@ -70,8 +70,7 @@ Result<Lens> ReadLens(const JsonValue& frame, const JsonValue& root) {
         model == "RADIAL_FISHEYE") {
       lens.model = LensModel::kFisheye;
     } else if (!known) {
-      return value->Complain(
-          Cat("camera model ", Printable(model), " is not a lens that is known here; undistort the images first"));
+      return value->Complain(Cat("camera model ", Printable(model), " is not supported; undistort the images first"));
     }
   }
   if (const auto value = FindEither(frame, root, "is_fisheye"); value && value->raw() == true) {
@@ -98,7 +97,7 @@ Result<Lens> ReadLens(const JsonValue& frame, const JsonValue& root) {
   lens.tangential = {k[6], k[7]};
   if (lens.model == LensModel::kFisheye) {
     if (full || k[6] != 0 || k[7] != 0) {
-      return frame.Complain("a fisheye lens with k5, k6, p1 or p2; only k1 to k4 are known of it");
+      return frame.Complain("has a fisheye lens with k5, k6, p1 or p2; only k1 to k4 are supported");
     }
   }
   return lens.IsIdentity() ? Lens{} : lens;
@@ -113,7 +112,7 @@ Result<Pinhole> ReadIntrinsics(const JsonValue& frame, const JsonValue& root, co
   } else {
     if (!IsFile(picture.file)) {
       if (!picture.ambiguity.empty()) return frame.Complain(picture.ambiguity);
-      return frame.Complain(Cat("neither \"w\" and \"h\" nor a picture to take the size from (looked for at ",
+      return frame.Complain(Cat("no image size: expected \"w\" and \"h\", or the picture (looked for at ",
                                 Printable(picture.file.string()), ")"));
     }
     ANCHORSPLAT_ASSIGN_OR_RETURN(const ImageSize size, ReadImageSize(picture.file));
@@ -207,7 +206,7 @@ Result<std::vector<FoundPicture>> FindPicturesOfFrames(std::span<const JsonValue
     if (found[i].ambiguity.empty()) found[i].ambiguity = found_masks[i].ambiguity;
     if (found[i].mask.empty() && found[i].ambiguity.empty() && IsFolder(folder)) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue value, frames[i].Get("mask_path"));
-      return frames[i].Named(value.Complain(Cat("there is no mask ", Printable(masks[i]), " in ", folder.string())),
+      return frames[i].Named(value.Complain(Cat("mask ", Printable(masks[i]), " not found in ", folder.string())),
                              "file_path");
     }
   }

@@ -50,7 +50,7 @@ std::string Coefficients(const Lens& lens) {
 
 Error BadLens(const Lens& lens, const std::string& what) {
   return Error{ErrorCode::kBadFile, Cat("lens distortion (", Coefficients(lens), ") ", what,
-                                        "; no lens draws so: mend the coefficients, or undistort the pictures first")};
+                                        "; correct the coefficients, or undistort the pictures first")};
 }
 
 // Whether the lens covers every point of a circle around the image centre.
@@ -101,13 +101,13 @@ Result<Pinhole> UndistortedPinhole(const Lens& lens, const Pinhole& distorted) {
   if (lens.IsIdentity()) return distorted;
   const LensInverse inverse(lens);
   if (!(inverse.largest_radius() > 0)) {
-    return BadLens(lens, "folds the picture at its middle");
+    return BadLens(lens, "folds the picture at its centre");
   }
   const double least = lens.model == LensModel::kFisheye ? kLeastOfFisheye : kLeastOfRadial;
   if (!DrawsTheMiddle(inverse, distorted, least)) {
     return BadLens(lens,
-                   Cat("cannot be undone: it draws less than ", std::lround(100 * least), "% of the way from the ",
-                       distorted.width, " x ", distorted.height, " picture's middle to its border"));
+                   Cat("cannot be inverted: it covers less than ", std::lround(100 * least), "% of the way from the ",
+                       distorted.width, " x ", distorted.height, " picture's centre to its border"));
   }
   Borders x, y;
   const auto look = [&](double u, double v, double& nearest, size_t axis, double sign) {
@@ -129,7 +129,7 @@ Result<Pinhole> UndistortedPinhole(const Lens& lens, const Pinhole& distorted) {
   const double wide = SideScale(x, distorted.width, distorted.cx), high = SideScale(y, distorted.height, distorted.cy);
   if (!(wide >= kShortest && high >= kShortest)) {
     return BadLens(lens, Cat("leaves less than a fifth of the ", distorted.width, " x ", distorted.height,
-                             " picture's side when it is undone"));
+                             " picture's side after undistortion"));
   }
   Pinhole out = distorted;
   out.width = std::max(1, static_cast<int>(std::min(wide, kLongest) * distorted.width));
@@ -137,7 +137,7 @@ Result<Pinhole> UndistortedPinhole(const Lens& lens, const Pinhole& distorted) {
   out.cx = distorted.cx * out.width / distorted.width;
   out.cy = distorted.cy * out.height / distorted.height;
   if (const Status status = CheckIntrinsics(out); !status.ok()) {
-    return Error{ErrorCode::kBadFile, Cat("lens distortion, undone: ", status.error().message)};
+    return Error{ErrorCode::kBadFile, Cat("after undistortion: ", status.error().message)};
   }
   return out;
 }

@@ -58,8 +58,8 @@ Status TellOfMissing(std::span<ViewSource* const> sources, const std::vector<std
     return Error{ErrorCode::kBadArgument, Cat("no view is on both sides: ", sentence)};
   }
   const size_t count = missing.size() + spare.size();
-  LogWarning(Cat(count, count == 1 ? " view has no partner and is" : " views have no partner and are",
-                 " left out: ", sentence));
+  LogWarning(Cat(count, count == 1 ? " view has no counterpart and is" : " views have no counterpart and are",
+                 " skipped: ", sentence));
   return {};
 }
 
@@ -184,7 +184,7 @@ Result<std::vector<Comparison>> CompareToReference(std::span<ViewSource* const> 
   }
   if (!masked.empty() && std::ssize(masked) == count) {
     return Error{ErrorCode::kBadArgument,
-                 "the masks leave nothing of any view to compare: black is left out, white counts"};
+                 "the masks hide every pixel of all views: black hides a pixel, white uses it"};
   }
   if (!masked.empty()) LogWarning(WhollyMasked(masked, count));
   for (Comparison& comparison : out) TakeMeans(options, comparison);

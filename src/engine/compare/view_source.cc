@@ -44,7 +44,7 @@ class SplatViewSource : public ViewSource {
     ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(still_, camera, options_, output_));
     if (!warned_) {
       const std::string warning = EmptyPictureReason(cloud_, camera, options_, rasterizer_.statistics().visible);
-      if (!warning.empty()) LogWarning(warning + " --near and --far say what is in range");
+      if (!warning.empty()) LogWarning(warning + " Set the range with --near and --far");
       warned_ = !warning.empty();
     }
     Image image = output_.color;
@@ -203,7 +203,7 @@ Result<std::unique_ptr<ViewSource>> OpenImageViews(const fs::path& path, const s
     });
     if (elsewhere > 0) {
       LogInfo(Cat(path.string(), ": ", elsewhere, " of ", views.size(),
-                  " pictures are in folders of no camera's pictures and are not used"));
+                  " pictures are in folders without pictures of the cameras, and are not used"));
     }
     std::erase_if(views, std::not_fn(owned));
   }

@@ -130,7 +130,7 @@ TEST(ViewSource, WhollyMaskedViewsAndStrangersDoNotCount) {
   EXPECT_EQ((*compared)[0].views[0].reference_view, 1u);
   EXPECT_NEAR((*compared)[0].mean_psnr, 20, 0.2);
   ASSERT_EQ(messages.warnings().size(), 1u);
-  EXPECT_NE(messages.warnings()[0].find("1 of 2 views, which are left out"), std::string::npos)
+  EXPECT_NE(messages.warnings()[0].find("1 of 2 views, which are skipped"), std::string::npos)
       << messages.warnings()[0];
   for (const std::string& note : messages.notes()) {
     EXPECT_EQ(note.find("not used"), note.npos) << note << ": the search for the cameras' pictures has said it";

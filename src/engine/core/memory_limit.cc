@@ -82,7 +82,7 @@ uint64_t NumberIn(const char* path) {
 
 DiskFull::DiskFull(uint64_t bytes, const std::filesystem::path& folder, int error)
     : message_(Cat("no room for ", HumanBytes(bytes), " of temporary files in ", folder.string(), ": ",
-                   std::generic_category().message(error), " (--max-memory with more memory needs less of them)")) {}
+                   std::generic_category().message(error), " (a larger --max-memory needs less)")) {}
 
 uint64_t MachineMemory() {
   const long pages = ::sysconf(_SC_PHYS_PAGES), page = ::sysconf(_SC_PAGESIZE);

@@ -183,10 +183,10 @@ Result<EditAction> ParseValue(EditAction action, std::string_view name, const st
   if (plain == "opacity" || is_scale || is_color) {
     keep.property = plain;
     if (!raw && plain == "opacity") {
-      if (!(*value >= 0 && *value <= 1)) return Bad(name, Cat("an opacity is 0 to 1, not ", *value));
+      if (!(*value >= 0 && *value <= 1)) return Bad(name, Cat("opacity must be 0 to 1, not ", *value));
       keep.value = std::log(*value / (1 - *value));
     } else if (!raw && is_scale) {
-      if (!(*value >= 0)) return Bad(name, Cat("a scale is a length of 0 or more, not ", *value));
+      if (!(*value >= 0)) return Bad(name, Cat("scale must be a length of 0 or more, not ", *value));
       keep.value = std::log(*value);
     } else if (!raw) {
       keep.value = (*value - 0.5) / kHarmonicOfColor;
@@ -286,7 +286,7 @@ Result<EditAction> ParseAction(std::string_view name, const std::string& text, c
     const auto& n = *numbers;
     return Finished(std::move(action), KeepSphere{Times(to_rdf, Vec3{n[0], n[1], n[2]}), n[3]});
   }
-  return Error{ErrorCode::kBadArgument, Cat("'", Printable(std::string(name)), "' is no action on a splat")};
+  return Error{ErrorCode::kBadArgument, Cat("'", Printable(std::string(name)), "' is not an edit")};
 }
 
 }  // namespace anchorsplat

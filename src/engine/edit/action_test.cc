@@ -97,7 +97,7 @@ TEST(EditAction, WhatMakesNoSenseIsNamed) {
                         Case{"--filter-harmonics", "1.5", "a degree"},
                         Case{"--filter-floaters", "0.05,0.1,0.004", "takes one factor"},
                         Case{"--filter-floaters", "-1", "takes one factor"},
-                        Case{"--flip", "x", "is no action"}}) {
+                        Case{"--flip", "x", "is not an edit"}}) {
     SCOPED_TRACE(c.name + std::string(" ") + c.text);
     const auto action = ParseAction(c.name, c.text);
     ASSERT_FALSE(action.ok());

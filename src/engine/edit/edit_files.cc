@@ -184,7 +184,7 @@ void DropPlaces(std::span<EditedSplat> splats) {
 void WarnOfUndrawn(const std::filesystem::path& output, int64_t undrawn, int64_t gaussians) {
   if (undrawn == 0) return;
   LogWarning(Cat(output.string(), ": ", WithThousands(undrawn), " of ", WithThousands(gaussians),
-                 " Gaussians have a position, scale, rotation or opacity that no verb draws: ", kWhyUnusable));
+                 " Gaussians cannot be drawn: ", kWhyUnusable));
 }
 
 Result<EditReport> EditFiles(const EditJob& job, const std::filesystem::path& output, GaussianCloud* kept) try {
@@ -203,7 +203,7 @@ Result<EditReport> EditFiles(const EditJob& job, const std::filesystem::path& ou
 } catch (const DiskFull& none) {
   return Error{ErrorCode::kIo, Cat(output.string(), ": ", none.what())};
 } catch (const std::bad_alloc&) {
-  return Error{ErrorCode::kIo, Cat(output.string(), ": there is not enough memory for its Gaussians")};
+  return Error{ErrorCode::kIo, Cat(output.string(), ": not enough memory for its Gaussians")};
 }
 
 }  // namespace anchorsplat

@@ -256,7 +256,7 @@ TEST(EditFiles, MergedSplatsStandBehindEachOther) {
   EXPECT_EQ(extras.normals.size(), 360u);
   EXPECT_THAT(out.comments, ElementsAre("credit: one", std::string(kPartEnhancedMark) + "model, 4 times closer",
                                         "world up: 0 -1 0", "credit: two"));
-  EXPECT_THAT(messages.warnings(), Contains(HasSubstr("rasterized in different ways")));
+  EXPECT_THAT(messages.warnings(), Contains(HasSubstr("different render modes")));
   EXPECT_THAT(messages.warnings(), Contains(HasSubstr("\"label\" of some")));
 }
 

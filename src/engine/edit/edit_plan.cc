@@ -103,8 +103,7 @@ Result<int64_t> TakeFloaters(std::span<EditedSplat> splats, const FloaterOptions
   constexpr uint32_t kNone = UINT32_MAX;
   int64_t most = 0;
   for (const EditedSplat& splat : splats) most += splat.kept;
-  if (most >= int64_t{kNone})
-    return Error{ErrorCode::kBadArgument, "there are too many Gaussians for --filter-floaters"};
+  if (most >= int64_t{kNone}) return Error{ErrorCode::kBadArgument, "too many Gaussians for --filter-floaters"};
   Buffer<float> places(static_cast<size_t>(3 * most)), lengths(static_cast<size_t>(most));
   std::vector<std::vector<uint32_t>> number(splats.size());
   int64_t begin = 0;

@@ -147,7 +147,7 @@ Status Write(const EditJob& job, const std::filesystem::path& output, const std:
   ANCHORSPLAT_RETURN_IF_ERROR(file.Commit());
   WarnOfUndrawn(output, writing.undrawn, report.gaussians_written);
   if (const std::string lost = properties.lost(true); !lost.empty()) {
-    LogWarning(Cat(output.string(), ": other properties of the input are dropped: ", lost));
+    LogWarning(Cat(output.string(), ": extra properties of the input dropped: ", lost));
   }
   if (const Result<OpenedSplat> written = OpenWritten(output, job.convert.write); written.ok()) {
     report.output_bytes = written->bytes();

@@ -38,13 +38,12 @@ std::vector<std::string> MergedComments(std::span<const EditedSplat> splats) {
       const std::string said = IsMark(comment) && !everywhere ? OfAPart(comment) : comment;
       if (Has(merged, said)) continue;
       if (SaysBackground(comment) && !everywhere) {
-        LogWarning(Cat(splat.name,
-                       ": is merged with splats that were trained over another background, or do not say; \"",
+        LogWarning(Cat(splat.name, ": merged with splats that have another or no training background; \"",
                        Printable(comment), "\" is dropped"));
         continue;
       }
       if (SaysUp(comment) && std::ranges::any_of(merged, SaysUp)) {
-        LogWarning(Cat(splat.name, ": says where up is in other words than the splats before it, which count: \"",
+        LogWarning(Cat(splat.name, ": has another up direction than the splats before it, which is used; \"",
                        Printable(comment), "\" is dropped"));
         continue;
       }
@@ -63,8 +62,8 @@ std::optional<RenderMode> MergedMode(std::span<const std::optional<RenderMode>> 
     return std::nullopt;
   }
   LogWarning(
-      "the splats are rasterized in different ways (classic, antialiased, mip): the result says none, and some of it "
-      "will look wrong; --mode says one");
+      "the splats have different render modes (classic, antialiased, mip), so the result has none and parts of it "
+      "will look wrong. Set one with --mode");
   return std::nullopt;
 }
 

@@ -64,7 +64,7 @@ CameraRuleChoice ChooseCameraRule(const GaussianCloud& cloud, const CameraSet& s
   const auto smallest = [](std::string why) { return CameraRuleChoice{CameraPixelRule::kSmallest, std::move(why)}; };
   if (cameras.size() < kLeastCameras) return smallest(Cat("there are only ", cameras.size(), " cameras"));
   const std::optional<Vector> point = NearestToAxes(cameras);
-  if (!point) return smallest("the cameras face the same way");
+  if (!point) return smallest("all cameras face the same way");
 
   Buffer<float> distances, pixels, asides;
   Vector mean{};
@@ -83,17 +83,16 @@ CameraRuleChoice ChooseCameraRule(const GaussianCloud& cloud, const CameraSet& s
       Quantile(asides, 0.9) > kMostAside) {
     return smallest("the cameras do not face one point");
   }
-  if (Norm(mean) > kMostOneSided) return smallest("the cameras stand on one side");
+  if (Norm(mean) > kMostOneSided) return smallest("all cameras are on one side of the subject");
   const float near = Quantile(distances, 0.05), far = Quantile(distances, 0.95), typical = Quantile(distances, 0.5);
   if (far > kMostDistant * near) {
-    return smallest(Cat("some cameras stand ", Fixed(far / near, 1), " times closer to the subject than others"));
+    return smallest(Cat("some cameras are ", Fixed(far / near, 1), " times closer to the subject than others"));
   }
 
   // Zoom may vary at the same distance.
   const float finest = Quantile(pixels, 0.05), coarsest = Quantile(pixels, 0.95);
   if (coarsest > kMostDistant * finest) {
-    return smallest(
-        Cat("pixels of some cameras are ", Fixed(coarsest / finest, 1), " times smaller than those of others"));
+    return smallest(Cat("some cameras have ", Fixed(coarsest / finest, 1), " times smaller pixels than others"));
   }
 
   int64_t visible = 0, inside = 0;
@@ -104,7 +103,7 @@ CameraRuleChoice ChooseCameraRule(const GaussianCloud& cloud, const CameraSet& s
     if (Norm(Minus(Vector{p[0], p[1], p[2]}, *point)) < kInside * typical) ++inside;
   }
   if (static_cast<double>(inside) < kLeastInside * static_cast<double>(visible)) {
-    return smallest("much of the splat is nearer to the cameras than to the subject");
+    return smallest("much of the splat is closer to the cameras than to the subject");
   }
   return {CameraPixelRule::kMedian, "the cameras surround the subject"};
 }

@@ -111,7 +111,7 @@ TEST(CameraRule, OneSideCloseUpsAndSurroundingsAreNot) {
   }
   const auto of_zoomed = ChooseCameraRule(object, zoomed);
   EXPECT_EQ(of_zoomed.rule, CameraPixelRule::kSmallest);
-  EXPECT_NE(of_zoomed.why.find("times smaller than those of others"), std::string::npos) << of_zoomed.why;
+  EXPECT_NE(of_zoomed.why.find("times smaller pixels than others"), std::string::npos) << of_zoomed.why;
   // From so near that its front is half as far away as its middle.
   EXPECT_EQ(ChooseCameraRule(object, Ring(middle, 1.5, 0.3, kTurn, 0.1)).rule, CameraPixelRule::kMedian);
   EXPECT_EQ(ChooseCameraRule(object, Ring(middle, 0.7, 0.3, kTurn, 0.1)).rule, CameraPixelRule::kSmallest);

@@ -80,7 +80,7 @@ Result<CameraPixelSizes> PixelsOfCameras(const EnhanceOptions& options, const En
                                           : LogInfo(text);
   }
   report.camera_rule = sizes.rule == CameraPixelRule::kMedian ? "median" : "smallest";
-  if (!sizes.why.empty()) LogInfo(Cat("--camera-rule ", report.camera_rule, ": ", sizes.why));
+  if (!sizes.why.empty()) LogInfo(Cat("using --camera-rule ", report.camera_rule, ", as ", sizes.why));
   report.train_width = train_width;
   return sizes;
 }
@@ -250,9 +250,9 @@ void SayWhatIsTaken(const Treatment& treatment, const EnhanceReport& report) {
   const Reading& reading = *report.reading;
   std::string text = Cat("looks like ", DescribeProvenance(reading));
   if (report.pixel_size_source == PixelSizeSource::kRead) {
-    text += Cat("; training pixel estimated at ", reading.pixel, " (", reading.low, " to ", reading.high, "), using ",
-                treatment.pixel, treatment.gain > 0 ? " for the best expected result" : " to be safe",
-                ". --cameras or --pixel-size makes it exact");
+    text += Cat(". Estimated training pixel: ", reading.pixel, " (likely ", reading.low, " to ", reading.high,
+                "). Using ", treatment.pixel, treatment.gain > 0 ? ", which should look best" : " to be safe",
+                ". Pass --cameras or --pixel-size for the exact size");
   }
   LogInfo(text);
 }

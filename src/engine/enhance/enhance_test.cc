@@ -128,7 +128,7 @@ TEST_F(EnhanceTest, PixelSizeFromCameras) {
   EXPECT_EQ(enhanced->report.pixel_size_source, PixelSizeSource::kCameras);
   EXPECT_NEAR(enhanced->report.pixel_size, 0.0041, 0.0002);  // of the median view: they stand all around
   EXPECT_EQ(enhanced->report.camera_rule, "median");
-  EXPECT_TRUE(log_->Says("--camera-rule median: the cameras surround the subject")) << log_->text();
+  EXPECT_TRUE(log_->Says("--camera-rule median, as the cameras surround the subject")) << log_->text();
   options.camera_rule = CameraPixelRule::kSmallest;
   const auto smallest = Enhance(Ball(0.01), options);
   ASSERT_TRUE(smallest.ok()) << smallest.error().message;

@@ -179,7 +179,7 @@ TEST_F(Detail, GoesOnWithTheSameNetworkOnly) {
   ASSERT_TRUE(other.Write(options_.enlarge_with).ok());
   const auto refused = Refine(input_, options_, control);
   ASSERT_FALSE(refused.ok());
-  EXPECT_THAT(refused.error().message, testing::HasSubstr("network that enlarges is another one"));
+  EXPECT_THAT(refused.error().message, testing::HasSubstr("network that enlarges differs"));
 }
 
 TEST_F(Detail, SaysThatItIsInvented) {

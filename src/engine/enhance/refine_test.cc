@@ -140,7 +140,7 @@ TEST_F(Refinement, GoesOnWhereItWasStopped) {
   Image changed = ReadImage(picture).value();
   changed.pixels[0] = changed.pixels[0] > 0.5f ? 0.0f : 1.0f;
   ASSERT_TRUE(WritePng(picture, changed, {.overwrite = true}).ok());
-  EXPECT_THAT(Refine(input_, options_, control).error().message, HasSubstr("its set of pictures is another"));
+  EXPECT_THAT(Refine(input_, options_, control).error().message, HasSubstr("its set of pictures differs"));
   std::filesystem::rename(aside, picture);
   FlipBit(control.checkpoint, 5);
   EXPECT_THAT(Refine(input_, options_, control).error().message, HasSubstr("is damaged"));

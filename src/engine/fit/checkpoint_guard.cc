@@ -91,14 +91,13 @@ Status CompareSettings(const std::string& file, const std::string& theirs, const
       if (found == a.end() || own == b.end() || *found == *own) continue;
       const nlohmann::json& value = *own;
       const std::string how =
-          IsFingerprint(value) ? "another one" : Cat(SpokenValue(key, *found), ", here ", SpokenValue(key, value));
-      return Error{ErrorCode::kBadArgument,
-                   Cat(file, ": is a checkpoint of another run: its ", Spoken(key), " is ", how)};
+          IsFingerprint(value) ? "differs" : Cat("is ", SpokenValue(key, *found), ", here ", SpokenValue(key, value));
+      return Error{ErrorCode::kBadArgument, Cat(file, ": is a checkpoint of another run: its ", Spoken(key), " ", how)};
     }
     // Only fits with a far shell have these; that difference was already reported through the start.
     for (const auto& [key, value] : b.items()) {
       if (a.contains(key)) continue;
-      return Error{ErrorCode::kBadFile, Cat(file, ": is a checkpoint of another version, which knew no ", key)};
+      return Error{ErrorCode::kBadFile, Cat(file, ": is a checkpoint of another version, without ", key)};
     }
   }
   return Error{ErrorCode::kBadArgument, Cat(file, ": is a checkpoint of another run")};
@@ -109,7 +108,8 @@ Status CheckCheckpoint(const fs::path& checkpoint, std::span<const fs::path> out
   ANCHORSPLAT_RETURN_IF_ERROR(CheckNotInput(checkpoint));
   for (const fs::path& output : outputs) {
     if (!output.empty() && SamePlace(output, checkpoint)) {
-      return Error{ErrorCode::kBadArgument, Cat("--checkpoint ", checkpoint.string(), ": is the output itself")};
+      return Error{ErrorCode::kBadArgument,
+                   Cat("--checkpoint ", checkpoint.string(), ": is also the output; pass another file")};
     }
   }
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(checkpoint));

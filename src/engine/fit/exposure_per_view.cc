@@ -16,7 +16,7 @@ Buffer<float> NoExposures(int64_t views) {
 Status FollowExposure(const Image& rendered, int64_t view, Image& picture, Buffer<float>& exposures) {
   const auto views = static_cast<int64_t>(exposures.size() / 6);
   if (view < 0 || view >= views) {
-    return Error{ErrorCode::kBadArgument, Cat("there is no view ", view, " among ", views, " exposures")};
+    return Error{ErrorCode::kBadArgument, Cat("view ", view, " does not exist: there are ", views, " exposures")};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewExposure measured, EstimateExposure(rendered, picture));
   float* own = exposures.data() + 6 * view;

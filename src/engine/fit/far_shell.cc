@@ -146,14 +146,14 @@ Result<FarShell> MakeFarShell(const TrainingViews& views, const InitialPoints& s
   };
   const bool decides = !options.count;
   if (options.count && (*options.count < 0 || *options.count > kMostOnShell)) {
-    return Error{ErrorCode::kBadArgument, Cat("the far shell has 0 to ", kMostOnShell, " Gaussians")};
+    return Error{ErrorCode::kBadArgument, Cat("the far shell must have 0 to ", kMostOnShell, " Gaussians")};
   }
   if (views.train.empty()) return Error{ErrorCode::kBadArgument, "far shell: there are no views"};
-  if (options.count == 0) return none("as asked");
-  if (decides && !options.points_tell) return none("the first Gaussians do not say where the points end");
+  if (options.count == 0) return none("as requested");
+  if (decides && !options.points_tell) return none("as the start is not the project's points");
   const ShellPlace at = PlaceOf(views, start);
   if (!(kShellDistance * at.extent < 0.01 * std::numeric_limits<float>::max())) {
-    return none("cameras and points are too far apart");
+    return none("as cameras and points are too far apart");
   }
 
   const std::vector<Camera> looked_at = ViewsLookedAt(views.train);
@@ -166,7 +166,7 @@ Result<FarShell> MakeFarShell(const TrainingViews& views, const InitialPoints& s
   });
   const double without_points = ShareOfOpenCells(pictures);
   if (decides && without_points < kShellShare) {
-    return none(Cat("points are on ", PercentText(1 - without_points), " of the pictures"));
+    return none(Cat("as points cover ", PercentText(1 - without_points), " of the pictures"));
   }
 
   const int64_t count = options.count.value_or(CountFor(looked_at, options.max_gaussians));
@@ -187,8 +187,8 @@ Result<FarShell> MakeFarShell(const TrainingViews& views, const InitialPoints& s
   ClosePlainCells(options.background, pictures);
   shell.open_share = ShareOfOpenCells(pictures);
   if (decides && shell.open_share < kShellShare) {
-    return none(seen < kShellShare ? "where no points are the pictures are masked or transparent"
-                                   : "where no points are the pictures have one colour");
+    return none(seen < kShellShare ? "as the picture areas without points are masked or transparent"
+                                   : "as the picture areas without points have a single colour");
   }
 
   std::vector<ShellSample> samples;
@@ -214,15 +214,15 @@ Result<FarShell> MakeFarShell(const TrainingViews& views, const InitialPoints& s
   }
   if (rows == 0) {
     shell.cloud = {};
-    return none("no picture shows it");
+    return none("as no picture shows it");
   }
   std::vector<int64_t> made(static_cast<size_t>(rows));
   for (int64_t i = 0; i < rows; ++i) made[static_cast<size_t>(i)] = i;
   ANCHORSPLAT_ASSIGN_OR_RETURN(shell.cloud, Subset(shell.cloud, made));
   shell.units = {at.center, at.extent};
-  shell.why = Cat(
-      WithThousands(rows), " Gaussians at a distance of ", Fixed(shell.radius, 2), ", ",
-      decides ? Cat("no points are on ", PercentText(shell.open_share), " of the pictures") : std::string("as asked"));
+  shell.why = Cat(WithThousands(rows), " Gaussians at a distance of ", Fixed(shell.radius, 2), ", ",
+                  decides ? Cat("as no points cover ", PercentText(shell.open_share), " of the pictures")
+                          : std::string("as requested"));
   return shell;
 }
 

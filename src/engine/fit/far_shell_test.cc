@@ -125,7 +125,7 @@ TEST_F(FarShells, StandWhereNoPointsAreWithTheColourOfThePictures) {
   ASSERT_TRUE(shell.ok()) << shell.error().message;
   EXPECT_GT(shell->open_share, 0.5);
   EXPECT_LT(shell->open_share, 0.9) << "the ball is in every picture";
-  EXPECT_THAT(shell->why, HasSubstr("no points are on"));
+  EXPECT_THAT(shell->why, HasSubstr("no points cover"));
   EXPECT_DOUBLE_EQ(shell->radius, 10 * views.scene_scale) << "the cameras are farther out than the points";
   EXPECT_DOUBLE_EQ(shell->units.radius, views.scene_scale);
   const GaussianCloud& cloud = shell->cloud;
@@ -169,7 +169,7 @@ TEST_F(FarShells, AreNotMadeWherePointsAreEverywhere) {
   ASSERT_TRUE(shell.ok());
   EXPECT_TRUE(shell->cloud.empty());
   EXPECT_FALSE(shell->units.any());
-  EXPECT_THAT(shell->why, HasSubstr("none, points are on 100 %"));
+  EXPECT_THAT(shell->why, HasSubstr("none, as points cover 100 %"));
   // Who asks gets one, beyond the walls.
   const auto asked = MakeFarShell(views, walls, {.count = 300});
   ASSERT_TRUE(asked.ok());
@@ -182,7 +182,7 @@ TEST_F(FarShells, AreNotMadeOfABackground) {
   const auto plain = MakeFarShell(Views(Orbit(), GreyAt), points, {});
   ASSERT_TRUE(plain.ok());
   EXPECT_TRUE(plain->cloud.empty());
-  EXPECT_THAT(plain->why, HasSubstr("one colour"));
+  EXPECT_THAT(plain->why, HasSubstr("a single colour"));
   const auto asked = MakeFarShell(Views(Orbit(), GreyAt), points, {.count = 500});
   ASSERT_FALSE(asked->cloud.empty());
   EXPECT_NEAR(asked->cloud.sh[0] * kSh0 + 0.5, 0.6, 0.003);
@@ -357,7 +357,7 @@ TEST_F(FarShells, AFitGoesOnWithItsOwnOnly) {
     const auto refused = fit(other, true, 99);
     ASSERT_FALSE(refused.ok());
     EXPECT_EQ(refused.error().code, ErrorCode::kBadArgument);
-    EXPECT_THAT(refused.error().message, HasSubstr("its start is another one"));
+    EXPECT_THAT(refused.error().message, HasSubstr("its start differs"));
   }
   const auto whole = fit(300, true, 99);
   ASSERT_TRUE(whole.ok()) << whole.error().message;
@@ -368,7 +368,7 @@ TEST_F(FarShells, AFitGoesOnWithItsOwnOnly) {
   ASSERT_TRUE(fit(0, false, 9)->report.interrupted);
   const auto refused = fit(300, true, 99);
   ASSERT_FALSE(refused.ok());
-  EXPECT_THAT(refused.error().message, HasSubstr("its start is another one"));
+  EXPECT_THAT(refused.error().message, HasSubstr("its start differs"));
 }
 
 }  // namespace

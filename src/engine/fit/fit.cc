@@ -63,7 +63,7 @@ class KeptState {
   }
 
   Error NotedIn(Error error) const {
-    if (step_) error.message += Cat("; the state after ", WithThousands(*step_), " steps is kept in ", path_.string());
+    if (step_) error.message += Cat("; the state after ", WithThousands(*step_), " steps is saved in ", path_.string());
     return error;
   }
 
@@ -115,12 +115,14 @@ Status CheckSomethingCounts(PictureCache& pictures) {
     ANCHORSPLAT_RETURN_IF_ERROR(pictures.Load(view, picture, ignored));
     if (ignored.empty() || std::ranges::find(ignored, 0) != ignored.end()) return {};
   }
-  return Error{ErrorCode::kBadArgument, Cat("the masks hide all of the ", views.size(), " pictures, such as ",
-                                            views.front().photograph.mask.string(), "; black hides, white counts")};
+  return Error{ErrorCode::kBadArgument,
+               Cat("the masks hide every pixel of all ", views.size(), " pictures, such as ",
+                   views.front().photograph.mask.string(), "; black hides a pixel, white uses it")};
 }
 
 void WarnUnlessNoted(const Status& noted) {
-  if (!noted.ok()) LogWarning(Cat("--resume will need -w for the files left here: ", noted.error().message));
+  if (!noted.ok())
+    LogWarning(Cat("--resume will need -w to replace the files written so far: ", noted.error().message));
 }
 
 Status MeasureQualities(const TrainingViews& views, const FitOptions& options, Fitter& fitter, Fitted& out) {
@@ -155,8 +157,8 @@ void WarnWhereNothingIsLeft(const Fitted& fitted) {
       std::ranges::count_if(fitted.cloud.opacity_logits, [](float logit) { return Sigmoid(logit) >= kMinAlpha; });
   if (static_cast<double>(shows) >= kNextToNothing * static_cast<double>(fitted.report.gaussians_in)) return;
   LogWarning(Cat("the fit failed: only ", WithThousands(shows), " of ", WithThousands(fitted.cloud.size()),
-                 " Gaussians are visible, and it began with ", WithThousands(fitted.report.gaussians_in),
-                 ". Try --init view or another --init-extent"));
+                 " Gaussians are visible (", WithThousands(fitted.report.gaussians_in),
+                 " at the start). Try --init view or another --init-extent"));
 }
 
 }  // namespace

@@ -86,29 +86,30 @@ Status Validate(const FitOptions& options) {
                                     {"grow_scale2d", d.grow_scale2d},
                                     {"prune_scale3d", d.prune_scale3d},
                                     {"prune_scale2d", d.prune_scale2d}}) {
-    if (!(value >= 0 && std::isfinite(value))) return bad(Cat(name, " must be a number and not negative"));
+    if (!(value >= 0 && std::isfinite(value))) return bad(Cat(name, " must be finite and not negative"));
   }
   if (d.grow_scale3d == 0 || d.prune_scale3d == 0) return bad("grow_scale3d and prune_scale3d must be positive");
   const double ssim = options.objective.loss.ssim_weight;
   if (!(ssim >= 0 && ssim <= 1)) return bad("the weight of SSIM must lie in [0, 1]");
   if (d.max_gaussians < 0) return bad("max_gaussians must not be negative");
   const McmcOptions& m = options.mcmc;
-  if (m.cap_max < 1) return bad("mcmc grows to a bound: cap_max must be at least 1");
+  if (m.cap_max < 1) return bad("cap_max must be at least 1: mcmc grows to it");
   if (m.refine_every < 1) return bad("refine_every must be at least 1");
-  if (!(m.noise_lr >= 0 && std::isfinite(m.noise_lr))) return bad("noise_lr must be a number and not negative");
+  if (!(m.noise_lr >= 0 && std::isfinite(m.noise_lr))) return bad("noise_lr must be finite and not negative");
   if (!(m.min_opacity > 0 && m.min_opacity < 0.5)) return bad("min_opacity must lie between 0 and 0.5");
   for (const auto& [name, value] :
        {std::pair{"opacity_reg", options.regularizers.opacity_reg}, {"scale_reg", options.regularizers.scale_reg}}) {
-    if (!(value >= 0 && std::isfinite(value))) return bad(Cat(name, " must be a number and not negative"));
+    if (!(value >= 0 && std::isfinite(value))) return bad(Cat(name, " must be finite and not negative"));
   }
   const auto& center = options.far.center;
   if (!(options.far.radius >= 0 && std::isfinite(options.far.radius + center[0] + center[1] + center[2]))) {
-    return bad("the far units' centre and radius must be numbers, and the radius not negative");
+    return bad("the far shell's centre and radius must be finite, and the radius not negative");
   }
   if (options.mip_filter_every < 1) return bad("mip_filter_every must be at least 1");
-  if (options.mip_filter && options.pixel.upscale > 1) return bad("the smoothing filter is for pixels that are points");
+  if (options.mip_filter && options.pixel.upscale > 1)
+    return bad("the Mip-Splatting filter needs point pixels (upscale 1)");
   if (options.mip_filter && options.objective.render.mode != RenderMode::kMip) {
-    return bad("the smoothing filter is for the mode mip");
+    return bad("the Mip-Splatting filter needs the mode mip");
   }
   const int degree = options.objective.render.sh_degree;
   if (degree < 0 || degree > kMaxShDegree) return bad("SH degree must be 0 to 3");

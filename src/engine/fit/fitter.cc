@@ -21,14 +21,14 @@ Result<Fitter> Fitter::Begin(const FitOptions& options, PictureCache pictures, d
   if (state.cloud.empty()) return Error{ErrorCode::kBadArgument, "fit: there are no Gaussians to begin with"};
   const auto n = static_cast<size_t>(state.cloud.size());
   if (options.strategy == Strategy::kDefault && state.densification.gathered().count.size() != n) {
-    return Error{ErrorCode::kBadArgument, "fit: the state is that of a strategy which gathers nothing"};
+    return Error{ErrorCode::kBadArgument, "fit: the state lacks densification statistics: it is from another strategy"};
   }
   if (options.mip_filter && state.step > 0 && state.mip_filter.size() != n) {
-    return Error{ErrorCode::kBadArgument, "fit: the state is that of a fit without a smoothing filter"};
+    return Error{ErrorCode::kBadArgument, "fit: the state is from a fit without the Mip-Splatting filter"};
   }
   const size_t exposures = options.exposure_from < 0 || state.step == 0 ? 0 : 6 * pictures.views().size();
   if (state.exposures.size() != exposures) {
-    return Error{ErrorCode::kBadArgument, "fit: the state is that of a fit with other exposures of its views"};
+    return Error{ErrorCode::kBadArgument, "fit: the state is from a fit with other view exposures"};
   }
   Fitter fitter(options, std::move(pictures), scene_scale, std::move(state));
   if (fitter.CanReside() && !fitter.done()) fitter.residence_.MoveToGpu(fitter.state_);
@@ -164,7 +164,9 @@ Status Fitter::LearnOnGpu(const ObjectiveOptions& objective, const Camera& camer
   ResidentFit& fit = *residence_.resident();
   GpuObjective& shown = fit.objective();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const bool drawn, fit.Show(objective, camera));
-  if (!drawn) return Error{ErrorCode::kBadArgument, Cat("a GPU's floats are too few digits for ", camera.name)};
+  if (!drawn)
+    return Error{ErrorCode::kBadArgument,
+                 Cat("camera ", camera.name, " needs more precision than a GPU's 32-bit floats")};
   int64_t compared = view;
   if (FollowsExposure()) {
     compared = -1;  // an adjusted picture must not be cached

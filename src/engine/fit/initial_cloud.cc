@@ -23,7 +23,7 @@ Result<GaussianCloud> InitialCloud(const InitialPoints& points, double scene_sca
                                    const InitialCloudOptions& options) {
   if (points.size() == 0) return Bad("there are none");
   if (points.positions.size() != points.colors.size() || points.positions.size() % 3 != 0) {
-    return Bad("positions and colours do not agree");
+    return Bad("positions and colours differ in number");
   }
   if (!AllFinite(points.positions)) return Bad("a position is not finite");
   if (options.sh_degree < 0 || options.sh_degree > kMaxShDegree) return Bad("SH degree must be 0 to 3");

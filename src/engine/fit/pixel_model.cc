@@ -37,12 +37,11 @@ void SumAcross(const float* in, int samples, float scale, float* out, int count)
 
 Status Validate(const PixelModel& model) {
   if (!(model.upscale >= 1 && model.upscale <= kMostSamples)) {
-    return Error{ErrorCode::kBadArgument,
-                 Cat("pixels seen ", model.upscale, " times closer; must be 1 to ", kMostSamples, " times")};
+    return Error{ErrorCode::kBadArgument, Cat("upscale ", model.upscale, " must be 1 to ", kMostSamples)};
   }
   if (model.samples < 1 || model.samples > std::ceil(model.upscale)) {
     return Error{ErrorCode::kBadArgument,
-                 Cat(model.samples, " rays per pixel and side; must be 1 to ", std::ceil(model.upscale))};
+                 Cat(model.samples, " rays per pixel side; must be 1 to ", std::ceil(model.upscale))};
   }
   return {};
 }
@@ -52,8 +51,8 @@ PixelModel AreaModel(double upscale) { return {static_cast<int>(std::ceil(upscal
 Status Validate(const PixelSchedule& schedule) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(PixelModel{1, schedule.upscale}));
   if (!(schedule.half_from >= 0 && schedule.half_from <= schedule.all_from && schedule.all_from <= 1)) {
-    return Error{ErrorCode::kBadArgument, Cat("more rays per pixel from ", schedule.half_from, " and ",
-                                              schedule.all_from, " of the run on; must ascend from 0 to 1")};
+    return Error{ErrorCode::kBadArgument, Cat("half_from ", schedule.half_from, " and all_from ", schedule.all_from,
+                                              " must ascend from 0 to 1")};
   }
   return {};
 }

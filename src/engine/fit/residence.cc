@@ -16,7 +16,7 @@ void Residence::MoveToGpu(const FitState& state) {
   Result<std::unique_ptr<ResidentFit>> fit =
       ResidentFit::Begin(*device, state.cloud, state.optimizer, state.densification);
   if (!fit.ok()) {
-    LogWarning(Cat("The GPU draws the pictures, but the Gaussians stay in main memory: ", fit.error().message));
+    LogWarning(Cat("the GPU renders, but the Gaussians stay in main memory: ", fit.error().message));
     return;
   }
   fit_ = std::move(fit).value();
@@ -41,13 +41,13 @@ Status Residence::MoveToHost(FitState& state) {
 bool Residence::MoveToHost(FitState& state, const Error& why) {
   const Status home = MoveToHost(state);
   if (home.ok()) {
-    LogWarning(Cat("The Gaussians go back to main memory, and the work goes on there: ", why.message));
+    LogWarning(Cat("moving the Gaussians back to main memory and continuing there: ", why.message));
     return true;
   }
   fit_.reset();
   GiveUpGpu(home.error());
   if (state.step != step_) {
-    LogWarning(Cat("It goes on from step ", WithThousands(step_), ", of which there is a copy."));
+    LogWarning(Cat("continuing from step ", WithThousands(step_), ", the last one copied to main memory"));
   }
   state.step = step_;
   state.optimizer.set_steps(step_);

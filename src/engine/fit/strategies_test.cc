@@ -195,7 +195,7 @@ TEST(FitStrategies, AStateOfAnotherStrategyIsRefused) {
       << "what others follow from comes first";
   GaussianCloud elsewhere = initial;
   elsewhere.means[0] += 1;
-  EXPECT_THAT(refused([](FitOptions&) {}, elsewhere), HasSubstr("its start is another one"));
+  EXPECT_THAT(refused([](FitOptions&) {}, elsewhere), HasSubstr("its start differs"));
 
   const auto begin = [&](const FitOptions& options, FitState state) {
     return Fitter::Begin(options, PictureCache(views.train, {0, 0, 0}), views.scene_scale, std::move(state));
@@ -203,8 +203,8 @@ TEST(FitStrategies, AStateOfAnotherStrategyIsRefused) {
   FitState state =
       ReadFitCheckpoint(control.checkpoint, TensorFile::Open(control.checkpoint)->metadata().at("settings")).value();
   EXPECT_EQ(state.step, 1);
-  EXPECT_THAT(begin(standard, state).error().message, HasSubstr("a strategy which gathers nothing"));
-  EXPECT_THAT(begin(filtered, state).error().message, HasSubstr("without a smoothing filter"));
+  EXPECT_THAT(begin(standard, state).error().message, HasSubstr("lacks densification statistics"));
+  EXPECT_THAT(begin(filtered, state).error().message, HasSubstr("without the Mip-Splatting filter"));
   EXPECT_TRUE(begin(mcmc, state).ok());
 }
 

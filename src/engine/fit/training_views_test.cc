@@ -278,7 +278,7 @@ TEST(TrainingViews, MasksThatLeaveNothing) {
   EXPECT_EQ(fitted->report.train.views, std::ssize(views.train) - 1);
   EXPECT_TRUE(std::isfinite(fitted->report.train.psnr));
   ASSERT_EQ(messages.warnings().size(), 1u);
-  EXPECT_NE(messages.warnings()[0].find("a mask leaves nothing of 1 of"), std::string::npos) << messages.warnings()[0];
+  EXPECT_NE(messages.warnings()[0].find("masks hide every pixel of 1 of"), std::string::npos) << messages.warnings()[0];
   for (Camera& camera : views.train) camera.photograph.mask = folder / "black.png";
   const auto nothing = Fit(views, initial, options);
   ASSERT_FALSE(nothing.ok());

@@ -143,7 +143,7 @@ std::string FormatAttributeError(const AttributeError& error) {
   line("opacities  ", error.opacities, 1, "");
   line("colours    ", error.colors, 1, "");
   line("harmonics  ", error.harmonics, 1, "");
-  if (error.left_out > 0) out << "  " << WithThousands(error.left_out) << " Gaussians that are not shown left out\n";
+  if (error.left_out > 0) out << "  " << WithThousands(error.left_out) << " invisible Gaussians left out\n";
   return std::move(out).str();
 }
 

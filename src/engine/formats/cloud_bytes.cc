@@ -18,7 +18,7 @@ constexpr const char* kInMemory = "bytes in memory";  // name in messages
 
 Result<const SplatFormat*> FormatCalled(std::string_view name) {
   if (const SplatFormat* format = FormatOfName(name)) return format;
-  return Error{ErrorCode::kBadArgument, Cat("\"", Printable(std::string(name)), "\" is no splat format")};
+  return Error{ErrorCode::kBadArgument, Cat("\"", Printable(std::string(name)), "\" is not a splat format")};
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ std::string WrittenFormats() {
 }
 
 Error OutOfMemory(const std::filesystem::path& path) {
-  return {ErrorCode::kIo, Cat(path.string(), ": there is not enough memory for its Gaussians")};
+  return {ErrorCode::kIo, Cat(path.string(), ": not enough memory for its Gaussians")};
 }
 
 }  // namespace
@@ -47,10 +47,10 @@ Status WriteCloud(const std::filesystem::path& path, const CloudView& cloud, con
                   const ExtraProperties& extras) try {
   const SplatFormat* format = FormatOfExtension(path);
   if (format == nullptr || format->write == nullptr) {
-    const std::string what =
-        format == nullptr ? Cat("has no extension of a splat format")
-                          : Cat("is ", format->article, " ", format->name, " file, which this version does not write");
-    return Error{ErrorCode::kBadArgument, Cat(path.string(), ": ", what, "; it writes ", WrittenFormats())};
+    const std::string what = format == nullptr
+                                 ? Cat("has no splat extension")
+                                 : Cat("is ", format->article, " ", format->name, " file, which cannot be written");
+    return Error{ErrorCode::kBadArgument, Cat(path.string(), ": ", what, "; supported: ", WrittenFormats())};
   }
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   const HiddenRows hidden = HideRows(*format, cloud);
@@ -61,7 +61,7 @@ Status WriteCloud(const std::filesystem::path& path, const CloudView& cloud, con
   WarnOfHiddenRows(path, *format, hidden);
   for (const std::string& loss : WriteLosses(*format, written)) LogWarning(Cat(path.string(), ": ", loss));
   if (const std::string lost = extras.lost(keeps); !lost.empty()) {
-    LogWarning(Cat(path.string(), ": other properties of the input are dropped: ", lost));
+    LogWarning(Cat(path.string(), ": extra properties of the input dropped: ", lost));
   }
   return {};
 } catch (const std::bad_alloc&) {

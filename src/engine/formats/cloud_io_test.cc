@@ -114,8 +114,8 @@ TEST(CloudIo, RefusesToOverwriteUnlessTold) {
 TEST(CloudIo, RefusesWhatItCannotWrite) {
   const TestFolder folder;
   GaussianCloud cloud = RandomCloud(2, 0, 1);
-  EXPECT_CONTAINS(WriteCloud(folder / "a.obj", cloud).error().message, "no extension of a splat format; it writes");
-  EXPECT_CONTAINS(WriteCloud(folder / "a.ksplat", cloud).error().message, "which this version does not write");
+  EXPECT_CONTAINS(WriteCloud(folder / "a.obj", cloud).error().message, "no splat extension; supported: ");
+  EXPECT_CONTAINS(WriteCloud(folder / "a.ksplat", cloud).error().message, "which cannot be written");
   EXPECT_CONTAINS(WriteCloud(folder / "a.ply", GaussianCloud{}).error().message, "no Gaussians to write");
   cloud.quats.pop_back();
   EXPECT_CONTAINS(WriteCloud(folder / "a.ply", cloud).error().message, "quats has 7 values");
@@ -190,9 +190,9 @@ TEST(Registry, ContentGoesBeforeExtension) {
   fs::copy_file(folder / "a.ply", folder / "misnamed.spz");
   EXPECT_EQ(ReadError(folder / "misnamed.spz"), "accepted");
   ASSERT_TRUE(WriteWholeFile(folder / "b.ply", "something else", false).ok());
-  EXPECT_CONTAINS(ReadError(folder / "b.ply"), "is no PLY file");
+  EXPECT_CONTAINS(ReadError(folder / "b.ply"), "is not a PLY file");
   ASSERT_TRUE(WriteWholeFile(folder / "b.txt", "something else", false).ok());
-  EXPECT_CONTAINS(ReadError(folder / "b.txt"), "is no splat file of a known format");
+  EXPECT_CONTAINS(ReadError(folder / "b.txt"), "is not in a known splat format");
   ASSERT_TRUE(WriteWholeFile(folder / "empty.ply", "", false).ok());
   EXPECT_CONTAINS(ReadError(folder / "empty.ply"), "is empty");
 }
@@ -204,9 +204,8 @@ TEST(CloudIo, SaysWhatSomethingElseIs) {
   ASSERT_TRUE(WriteCloud(folder / "a.npz", cloud).ok());
   fs::copy_file(folder / "a.npz", folder / "scan.bin");
   for (const char* name : {"a.npz", "scan.bin"}) {
-    EXPECT_CONTAINS(ReadError(folder / name),
-                    "is an NPZ file, which this version writes for other programs and does not");
-    EXPECT_CONTAINS(ReadError(folder / name), "give the splat that it was made from, as compressed PLY");
+    EXPECT_CONTAINS(ReadError(folder / name), "is an NPZ file, which can be written but not read");
+    EXPECT_CONTAINS(ReadError(folder / name), "pass the splat it was made from, as compressed PLY");
   }
   ASSERT_TRUE(WriteCloud(folder / "a.csv", cloud).ok());
   EXPECT_CONTAINS(ReadError(folder / "a.csv"), "is a CSV file");
@@ -214,10 +213,15 @@ TEST(CloudIo, SaysWhatSomethingElseIs) {
     EXPECT_TRUE(WriteWholeFile(folder / "other", bytes, true).ok());
     return ReadError(folder / "other");
   };
-  EXPECT_CONTAINS(other("\x89PNG\r\n\x1a\n"), "is a PNG picture and no splat; expected compressed PLY");
-  EXPECT_CONTAINS(other("<!DOCTYPE html>"), "is a web page and no splat");
-  EXPECT_CONTAINS(other("x"), "byte 0: is no splat file of a known format: found \"x\"");
-  EXPECT_CONTAINS(other("\x01\x02\x03\x80"), "which has no mark but its name, is read by convert --from .splat");
+  EXPECT_CONTAINS(other("\x89PNG\r\n\x1a\n"), "is a PNG picture, not a splat");
+  EXPECT_CONTAINS(other("<!DOCTYPE html>"), "is a web page, not a splat");
+  EXPECT_CONTAINS(other("x"), "byte 0: is not in a known splat format: found \"x\"");
+  EXPECT_CONTAINS(other("\x01\x02\x03\x80"), "are recognised by name only");
+  EXPECT_CONTAINS(other("{\"camera_angle_x\": 0.7, \"frames\": []}"), "looks like a camera file; pass cameras with");
+  ASSERT_TRUE(WriteWholeFile(folder / "images.bin", std::string_view("\0\1", 2), true).ok());
+  EXPECT_CONTAINS(ReadError(folder / "images.bin"), "looks like part of a COLMAP model");
+  fs::create_directories(folder / "scan/sparse");
+  EXPECT_CONTAINS(ReadError(folder / "scan"), "looks like a project with cameras; pass");
 }
 
 TEST(Registry, RowsAreConsistent) {

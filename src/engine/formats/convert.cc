@@ -67,7 +67,7 @@ Status ParseAxes(std::string_view text, ConvertOptions& options) {
     *axes[k] = AxesFromName(parts[k]);
     if (!*axes[k]) {
       return Error{ErrorCode::kBadArgument, Cat("\"", Printable(std::string(parts[k])),
-                                                "\" are no axes: expected Right or Left, Up or Down, Front or Back, "
+                                                "\" are not axes: expected Right or Left, Up or Down, Front or Back, "
                                                 "each once, for x, y and z, as in RDF, RUB or "
                                                 "RFU")};
     }
@@ -173,7 +173,7 @@ void WarnOfUnusable(const SplatFormat& to, const std::string& name, const Gaussi
   // written.
   if (const int64_t bad = to.keeps_all_values ? CountUnusable(cloud, false) : 0; bad > 0) {
     LogWarning(Cat(name, ": ", WithThousands(bad), " of ", WithThousands(cloud.size()),
-                   " Gaussians have a position, scale, rotation or opacity that no verb draws: ", kWhyUnusable));
+                   " Gaussians cannot be drawn: ", kWhyUnusable));
   }
 }
 
@@ -268,7 +268,7 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
 } catch (const DiskFull& none) {
   return Error{ErrorCode::kIo, Cat(input.string(), ": ", none.what())};
 } catch (const std::bad_alloc&) {
-  return Error{ErrorCode::kIo, Cat(input.string(), ": there is not enough memory for its Gaussians")};
+  return Error{ErrorCode::kIo, Cat(input.string(), ": not enough memory for its Gaussians")};
 }
 
 }  // namespace anchorsplat

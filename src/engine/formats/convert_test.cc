@@ -260,7 +260,7 @@ TEST(Convert, SaysWhatHasNoPlaceInTheFormat) {
   for (const char* lossy : {".compressed.ply", ".spz", ".sog", ".glb", ".ply", ".csv", ".npz"}) {
     EXPECT_THAT(warn(tame, lossy), IsEmpty()) << lossy;
   }
-  EXPECT_THAT(warn(tame, ".splat"), ElementsAre(HasSubstr("harmonics beyond degree 0")));
+  EXPECT_THAT(warn(tame, ".splat"), ElementsAre(HasSubstr("harmonics above degree 0")));
   EXPECT_THAT(warn(WithShDegree(tame, 0), ".splat"), IsEmpty());
 
   GaussianCloud cloud = tame;
@@ -269,7 +269,7 @@ TEST(Convert, SaysWhatHasNoPlaceInTheFormat) {
   cloud.log_scales[7] = std::nanf("");
   cloud.sh[12] = 3;
   cloud.sh[36 + 7] = 1.5f;
-  const auto hidden = HasSubstr("1 of 2,000 Gaussians, which no verb draws");
+  const auto hidden = HasSubstr("1 of 2,000 Gaussians cannot be drawn");
   EXPECT_THAT(warn(cloud, ".spz"), ElementsAre(hidden, HasSubstr("1 of 2,000 Gaussians have log-scales beyond"),
                                                AllOf(HasSubstr("1 of 2,000"), HasSubstr("harmonics beyond"))));
   EXPECT_THAT(warn(WithShDegree(cloud, 0), ".splat"), ElementsAre(hidden, HasSubstr("f_dc beyond")));

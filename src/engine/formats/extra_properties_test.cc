@@ -150,14 +150,14 @@ TEST(ExtraProperties, WhatHasNoPlaceIsNamed) {
     const Messages messages;
     ASSERT_TRUE(ConvertFile(input, folder / "a.ply", {}).ok());
     EXPECT_THAT(messages.warnings(),
-                ElementsAre(HasSubstr("a.ply: other properties of the input are dropped: list \"neighbours\", element "
+                ElementsAre(HasSubstr("a.ply: extra properties of the input dropped: list \"neighbours\", element "
                                       "\"region\"")));
     ExpectTheirOwn(folder / "a.ply", cloud);
   }
   const Messages messages;
   ASSERT_TRUE(ConvertFile(input, folder / "a.glb", {}).ok());
   EXPECT_THAT(messages.warnings(),
-              ElementsAre(HasSubstr("a.glb: other properties of the input are dropped: label, index, confidence, "
+              ElementsAre(HasSubstr("a.glb: extra properties of the input dropped: label, index, confidence, "
                                     "normals, list \"neighbours\", element \"region\"")));
 }
 
@@ -231,7 +231,7 @@ TEST(ExtraProperties, ThoseOfOtherGaussiansAreRefused) {
   const Status status = WriteCloud(folder / "a.ply", RandomCloud(10, 0, 3), {}, extras);
   ASSERT_FALSE(status.ok());
   EXPECT_EQ(status.error().code, ErrorCode::kBadArgument);
-  EXPECT_THAT(status.error().message, HasSubstr("(label) are not of these 10 Gaussians"));
+  EXPECT_THAT(status.error().message, HasSubstr("(label) do not match the 10 Gaussians"));
   EXPECT_EQ(folder.Entries(), 0);
 }
 

@@ -71,14 +71,14 @@ HiddenRows HideRows(const SplatFormat& format, const CloudView& cloud) {
 void WarnOfHiddenRows(const std::filesystem::path& path, const SplatFormat& format, const HiddenRows& hidden) {
   const std::string of = Cat(" of ", WithThousands(hidden.written.size()), " Gaussians");
   if (!hidden.unusable.empty()) {
-    LogWarning(Cat(path.string(), ": ", WithThousands(std::ssize(hidden.unusable)), of, ", which no verb draws (",
-                   kWhyUnusable, "), have been written with an opacity of zero"));
+    LogWarning(Cat(path.string(), ": ", WithThousands(std::ssize(hidden.unusable)), of, " cannot be drawn (",
+                   kWhyUnusable, "): written with opacity 0"));
   }
   if (!hidden.strays.rows.empty()) {
-    LogWarning(
-        Cat(path.string(), ": ", WithThousands(std::ssize(hidden.strays.rows)), of, ", up to ", hidden.strays.farthest,
-            " from the middle, have been written with an opacity of zero: ", format.article, " ", format.name,
-            " file that reaches as far would round the positions of others too coarsely (a PLY keeps them all)"));
+    LogWarning(Cat(path.string(), ": ", WithThousands(std::ssize(hidden.strays.rows)), of, " lie up to ",
+                   hidden.strays.farthest, " from the centre: written with opacity 0, as ", format.article, " ",
+                   format.name,
+                   " file that reaches so far would round all other positions too coarsely (a PLY keeps them all)"));
   }
 }
 

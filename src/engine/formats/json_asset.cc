@@ -57,7 +57,7 @@ Result<std::vector<std::string>> CommentsOfAsset(const JsonValue& root) {
     const auto& text = copyright->raw().get_ref<const std::string&>();
     if (text.size() > kMostBytes) {
       return copyright->Complain(
-          Cat("is a text of ", HumanBytes(text.size()), ", longer than ", HumanBytes(kMostBytes)));
+          Cat("is ", HumanBytes(text.size()), " of text, more than the limit of ", HumanBytes(kMostBytes)));
     }
     comments = CommentsOfCopyright(text);
   }
@@ -82,8 +82,8 @@ void WarnOfAxisEntries(const std::string& file, std::span<const std::string> oth
     for (char& c : small) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
     const auto has = [&small](std::string_view word) { return small.find(word) != small.npos; };
     if (!small.starts_with("up") && std::ranges::none_of(kWords, has)) continue;
-    LogWarning(Cat(file, ": has an entry \"", Printable(name),
-                   "\", which its format does not have: not heeded; --coords of convert says what the axes are"));
+    LogWarning(Cat(file, ": ignoring the entry \"", Printable(name),
+                   "\", which its format does not define; set the axes with convert --coords"));
   }
 }
 

@@ -94,9 +94,9 @@ void LinearColor::ToSrgb(float* sh) const {
 }
 
 std::string LinearColorInWords(int sh_degree) {
-  return Cat("its colours are linear light and become sRGB",
-             sh_degree > 0 ? ", as near as spherical harmonics can say it" : "",
-             "; where Gaussians cover each other they blend a little differently");
+  return Cat("its colours are linear light; converted to sRGB",
+             sh_degree > 0 ? " (spherical harmonics approximately)" : "",
+             ", so overlapping Gaussians blend slightly differently");
 }
 
 void SrgbFromLinear(GaussianCloud& cloud, int64_t first, int64_t count) {

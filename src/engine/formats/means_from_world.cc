@@ -47,9 +47,10 @@ void WarnOfRounding(const std::string& file, const Buffer<double>& world, const 
     most = std::max(most, off);
   }
   if (count == 0) return;
-  LogWarning(Cat(file, ": positions of ", WithThousands(count), " of ", WithThousands(cloud.size()),
-                 " Gaussians are rounded, by up to ", most,
-                 ": they lie too far from the others for 32-bit floats. Split the file into parts that lie together"));
+  LogWarning(
+      Cat(file, ": positions of ", WithThousands(count), " of ", WithThousands(cloud.size()),
+          " Gaussians are rounded, by up to ", most,
+          ": they lie too far from the others for 32-bit floats. Split the file into parts that lie close together"));
 }
 
 }  // namespace

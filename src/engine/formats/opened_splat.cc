@@ -31,6 +31,26 @@ std::string ReadFormats() {
   return list;
 }
 
+// What a user may have meant by something that is not a splat; empty if unclear.
+std::string HintFor(const fs::path& path, std::string_view head) {
+  constexpr const char* kPass = "; pass cameras with --cameras, or the project to `fit`";
+  if (IsFolder(path)) {
+    for (const char* part : {"sparse", "cameras.bin", "cameras.txt", "transforms.json", "transforms_train.json"}) {
+      if (Exists(path / part)) return Cat("; it looks like a project with cameras", kPass);
+    }
+    return {};
+  }
+  const std::string name = path.filename().string();
+  for (const char* part : {"cameras", "images", "points3D"}) {
+    if (name == Cat(part, ".bin") || name == Cat(part, ".txt"))
+      return Cat("; it looks like part of a COLMAP model", kPass);
+  }
+  for (const char* key : {"\"transform_matrix\"", "\"camera_angle_x\"", "\"fl_x\"", "\"img_name\""}) {
+    if (head.find(key) != head.npos) return Cat("; it looks like a camera file", kPass);
+  }
+  return {};
+}
+
 // Whether it must be decompressed or read whole to learn anything about it.
 bool IsWrapped(const fs::path& path) {
   const Result<InputFile> file = InputFile::Open(path);
@@ -46,13 +66,14 @@ Result<OpenedSplat> OpenedSplat::Open(const fs::path& path, const SplatFormat* f
   if (IsFolder(found.path)) {
     return Error{ErrorCode::kBadFile,
                  Cat(path.string(),
-                     ": is a folder without a meta.json, a lod-meta.json or results of a trainer: expected a "
-                     "splat file, or the folder of one")};
+                     ": is a folder without a meta.json, a lod-meta.json or a trainer's results: expected a "
+                     "splat file, or the folder of one",
+                     HintFor(found.path, {}))};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(InputFile input, InputFile::Open(found.path));
   if (found.by_step) {
-    LogInfo(Cat(path.string(), ": its latest splat is read, ", found.path.string(),
-                found.others.empty() ? "" : Cat("; there are also ", found.others)));
+    LogInfo(Cat(path.string(), ": using its latest splat, ", found.path.string(),
+                found.others.empty() ? "" : Cat("; others: ", found.others)));
   }
   return Of(std::move(input), format);
 }
@@ -73,8 +94,8 @@ Result<OpenedSplat> OpenedSplat::Of(InputFile input, const SplatFormat* format) 
       ANCHORSPLAT_ASSIGN_OR_RETURN(format, FormatOfFile(file, found.name));
     }
     if (format != nullptr && format->looks_like != nullptr && IsText(head) && !format->looks_like(file)) {
-      return Error{ErrorCode::kBadFile, Cat(file.name(), ": is no ", format->extensions.front(),
-                                            " file but text; it begins with \"", Printable(head.substr(0, 60)), "\"")};
+      return Error{ErrorCode::kBadFile, Cat(file.name(), ": is text, not a ", format->extensions.front(),
+                                            " file; it begins with \"", Printable(head.substr(0, 60)), "\"")};
     }
     OpenedSplat opened(std::move(file), format);
     opened.packed_ = std::move(found.packed);
@@ -83,7 +104,7 @@ Result<OpenedSplat> OpenedSplat::Of(InputFile input, const SplatFormat* format) 
   } catch (const DiskFull& none) {
     return Error{ErrorCode::kIo, Cat(name, ": ", none.what())};
   } catch (const std::bad_alloc&) {
-    return Error{ErrorCode::kIo, Cat(name, ": there is not enough memory for what is packed in it")};
+    return Error{ErrorCode::kIo, Cat(name, ": not enough memory to unpack it")};
   }
 }
 
@@ -100,19 +121,19 @@ std::optional<CloudExtent> OpenedSplat::Extent() const {
 
 Result<GaussianCloud> OpenedSplat::Read(const ReadLimits& limits, ExtraProperties* extras) const try {
   if (format_ == nullptr) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, input_.Head(16));
-    return Error{
-        ErrorCode::kBadFile,
-        Cat(input_.name(), ": byte 0: is no splat file of a known format: found \"", Printable(head.substr(0, 8)),
-            "\", expected ", ReadFormats(),
-            IsText(head) ? ""
-                         : "; a .splat or .ksplat, which has no mark but its name, is read by convert --from .splat")};
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, input_.Head(kSniffBytes));
+    std::string hint = HintFor(input_.path(), head);
+    if (hint.empty() && !IsText(head.substr(0, 16))) {
+      hint = "; .splat and .ksplat files are recognised by name only: rename the file, or use convert --from .splat";
+    }
+    return Error{ErrorCode::kBadFile, Cat(input_.name(), ": byte 0: is not in a known splat format: found \"",
+                                          Printable(head.substr(0, 8)), "\"", hint, "; expected ", ReadFormats())};
   }
   if (format_->read == nullptr) {
     return Error{ErrorCode::kBadFile,
-                 Cat(input_.name(), ": is ", format_->article, " ", format_->name, " file, which this version ",
-                     format_->write != nullptr ? "writes for other programs and " : "",
-                     "does not read; give the splat that it was made from, as ", ReadFormats())};
+                 Cat(input_.name(), ": is ", format_->article, " ", format_->name, " file, which ",
+                     format_->write != nullptr ? "can be written but not read" : "is not supported",
+                     "; pass the splat it was made from, as ", ReadFormats())};
   }
   if (extras != nullptr && format_->read_with_extras != nullptr) {
     return format_->read_with_extras(input_, limits, *extras);
@@ -121,7 +142,7 @@ Result<GaussianCloud> OpenedSplat::Read(const ReadLimits& limits, ExtraPropertie
 } catch (const DiskFull& none) {
   return Error{ErrorCode::kIo, Cat(input_.name(), ": ", none.what())};
 } catch (const std::bad_alloc&) {
-  return Error{ErrorCode::kIo, Cat(input_.name(), ": there is not enough memory for its Gaussians")};
+  return Error{ErrorCode::kIo, Cat(input_.name(), ": not enough memory for its Gaussians")};
 }
 
 std::optional<CloudExtent> ExtentOf(const fs::path& path, const SplatFormat* format) {

@@ -223,7 +223,7 @@ TEST(OriginOfFiles, BrokenOnesAreRefused) {
     bytes.insert(bytes.find("element vertex"), std::string("comment ") + broken + "\n");
     const auto read = ReadPly(InputFile::FromBytes("a.ply", bytes));
     ASSERT_FALSE(read.ok()) << broken;
-    EXPECT_THAT(read.error().message, HasSubstr("gives no origin"));
+    EXPECT_THAT(read.error().message, HasSubstr("is not an origin"));
   }
 }
 

@@ -33,7 +33,7 @@ TEST(SplatFolder, TheLatestOfATrainersResults) {
     ASSERT_TRUE(cloud.ok()) << cloud.error().message;
     EXPECT_EQ(cloud->size(), 3);
     ASSERT_EQ(messages.notes().size(), 1u);
-    EXPECT_NE(messages.notes()[0].find("there are also iteration_7000"), std::string::npos) << messages.notes()[0];
+    EXPECT_NE(messages.notes()[0].find("others: iteration_7000"), std::string::npos) << messages.notes()[0];
   }
   const Messages messages;
   EXPECT_EQ(ReadCloud(scene / "point_cloud" / "iteration_7000")->size(), 2);

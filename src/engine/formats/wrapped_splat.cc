@@ -65,7 +65,7 @@ Result<std::optional<std::string>> SplatIn(const InputFile& file, const ZipReade
   std::vector<std::string> members = archive.Members();
   std::erase_if(members, IsSystems);
   if (std::ranges::any_of(members, [](const fs::path& name) { return name.filename() == "lod-meta.json"; })) {
-    return Bad(file, "is a ZIP archive of a streamed SOG: unpack it and give its folder");
+    return Bad(file, "is a ZIP archive of a streamed SOG: unpack it and pass its folder");
   }
   if (FolderOfSog(members)) return std::optional<std::string>();
   std::vector<std::string> splats;
@@ -73,9 +73,9 @@ Result<std::optional<std::string>> SplatIn(const InputFile& file, const ZipReade
   if (splats.empty() && members.size() == 1) splats = members;  // whatever its name
   if (splats.size() == 1) return std::optional(splats.front());
   if (members.empty()) return Bad(file, "is an empty ZIP archive");
-  if (splats.empty()) return Bad(file, Cat("is a ZIP archive without a splat; in it are ", Listed(members)));
-  return Bad(file, Cat("is a ZIP archive of ", splats.size(), " splats (", Listed(splats),
-                       "): unpack it and give one of them"));
+  if (splats.empty()) return Bad(file, Cat("is a ZIP archive without a splat; it contains ", Listed(members)));
+  return Bad(file, Cat("is a ZIP archive with ", splats.size(), " splats (", Listed(splats),
+                       "): unpack it and pass one of them"));
 }
 
 Result<std::optional<UnwrappedSplat>> TakeOutOfZip(const InputFile& file, uint64_t compressed_size) {
@@ -116,28 +116,28 @@ struct Kind {
   const char* what;
 };
 constexpr Kind kKinds[] = {
-    {"\x89PNG", "is a PNG picture and no splat"},
-    {"\xff\xd8\xff", "is a JPEG picture and no splat"},
-    {"RIFF", "is a WebP picture or a sound and no splat"},
-    {"GIF8", "is a GIF picture and no splat"},
-    {"%PDF", "is a PDF document and no splat"},
-    {"LASF", "is a LAS point cloud and no splat"},
-    {"ASTM-E57", "is an E57 point cloud and no splat"},
+    {"\x89PNG", "is a PNG picture, not a splat (`fit` makes a splat of pictures with cameras)"},
+    {"\xff\xd8\xff", "is a JPEG picture, not a splat (`fit` makes a splat of pictures with cameras)"},
+    {"RIFF", "is a WebP picture or a sound, not a splat"},
+    {"GIF8", "is a GIF picture, not a splat"},
+    {"%PDF", "is a PDF document, not a splat"},
+    {"LASF", "is a LAS point cloud, not a splat"},
+    {"ASTM-E57", "is an E57 point cloud, not a splat"},
     {std::string_view("\xfd"
                       "7zXZ\0",
                       6),
-     "is packed with xz, which is not read: unpack it with unxz"},
-    {"\x04\x22\x4d\x18", "is packed with lz4, which is not read: unpack it with unlz4"},
-    {"7z\xbc\xaf", "is a 7z archive, which is not read: unpack it and give the splat in it"},
-    {"Rar!", "is a RAR archive, which is not read: unpack it and give the splat in it"},
-    {"version https://git-lfs", "is a pointer of Git LFS and not the file itself: git lfs pull fetches it"},
-    {"/annex/objects/", "is a pointer of git-annex and not the file itself: git annex get fetches it"},
+     "is compressed with xz, which is not supported: decompress it with unxz"},
+    {"\x04\x22\x4d\x18", "is compressed with lz4, which is not supported: decompress it with unlz4"},
+    {"7z\xbc\xaf", "is a 7z archive, which is not supported: unpack it and pass the splat in it"},
+    {"Rar!", "is a RAR archive, which is not supported: unpack it and pass the splat in it"},
+    {"version https://git-lfs", "is a Git LFS pointer, not the file itself: fetch it with git lfs pull"},
+    {"/annex/objects/", "is a git-annex pointer, not the file itself: fetch it with git annex get"},
 };
 // Skips whitespace and ignores case.
 constexpr Kind kTexts[] = {
-    {"<!doctype html", "is a web page and no splat: what was to be downloaded may need a login, or another address"},
-    {"<html", "is a web page and no splat: what was to be downloaded may need a login, or another address"},
-    {"<?xml", "is an XML document and no splat: a server may have sent it in place of the file"},
+    {"<!doctype html", "is a web page, not a splat: the download may need a login or another address"},
+    {"<html", "is a web page, not a splat: the download may need a login or another address"},
+    {"<?xml", "is an XML document, not a splat: a server may have sent it instead of the file"},
 };
 
 bool IsBzip2(std::string_view head) {
@@ -187,8 +187,8 @@ std::string DescribeNonSplat(std::string_view head) {
   for (const auto& [mark, what] : kKinds) {
     if (head.starts_with(mark)) return what;
   }
-  if (IsBzip2(head)) return "is packed with bzip2, which is not read: unpack it with bunzip2";
-  if (IsTar(head)) return "is a tar archive, which is not read: unpack it with tar -xf and give the splat in it";
+  if (IsBzip2(head)) return "is compressed with bzip2, which is not supported: decompress it with bunzip2";
+  if (IsTar(head)) return "is a tar archive, which is not supported: unpack it with tar -xf and pass the splat in it";
   std::string text(head.substr(0, 256));
   text.erase(0, text.starts_with("\xef\xbb\xbf") ? 3 : 0);
   text.erase(0, text.find_first_not_of(" \t\r\n"));

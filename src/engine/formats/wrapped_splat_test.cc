@@ -156,7 +156,7 @@ TEST_F(WrappedSplat, SpzInOtherPackings) {
   const std::string v4 = As("4.spz");
   EXPECT_CONTAINS(ExpectSame(File("f.spz", Gzip(v4)), folder_ / "4.spz"), "gzip around ");
   EXPECT_CONTAINS(ErrorOf(File("g.spz", content.substr(0, half))), "ends before its data does");
-  EXPECT_CONTAINS(ErrorOf(File("h.spz", content + "x")), "goes on behind its data");
+  EXPECT_CONTAINS(ErrorOf(File("h.spz", content + "x")), "continues after its data");
 }
 
 TEST_F(WrappedSplat, SeveralMembersAndWhatIsBehindThem) {
@@ -171,7 +171,7 @@ TEST_F(WrappedSplat, SeveralMembersAndWhatIsBehindThem) {
     EXPECT_TRUE(messages.warnings().empty());
     ExpectSame(File("b.ply", whole + "garbage"), plain);
     ASSERT_EQ(messages.warnings().size(), 1u);
-    EXPECT_CONTAINS(messages.warnings()[0], "the 7 bytes behind its ");
+    EXPECT_CONTAINS(messages.warnings()[0], "ignoring 7 bytes after its ");
     // Wherever it is cut, and whatever is changed.
     for (const size_t size : {size_t{11}, size_t{40}, whole.size() / 2, whole.size() - 1}) {
       const std::string error = ErrorOf(File("b.ply", whole.substr(0, size)));
@@ -197,7 +197,7 @@ TEST_F(WrappedSplat, BombsAreRefusedBeforeTheyAreUnpacked) {
 TEST_F(WrappedSplat, ArchivesOfOtherThings) {
   const std::string ply = As("a.ply"), sog = As("a.sog");
   EXPECT_CONTAINS(ErrorOf(Zip("a.zip", {{"x/one.ply", ply}, {"two.spz", "x"}})),
-                  "a.zip: is a ZIP archive of 2 splats (x/one.ply, two.spz): unpack it and give one of them");
+                  "a.zip: is a ZIP archive with 2 splats (x/one.ply, two.spz): unpack it and pass one of them");
   EXPECT_CONTAINS(ErrorOf(Zip("a.zip", {{"a.txt", "a"}, {"b.txt", "b"}})), "without a splat; in it are a.txt, b.txt");
   EXPECT_CONTAINS(ErrorOf(Zip("a.zip", {})), "is an empty ZIP archive");
   EXPECT_CONTAINS(ErrorOf(Zip("a.zip", {{"scene/0_0/meta.json", "{}"}, {"scene/lod-meta.json", "{}"}})),
@@ -206,7 +206,8 @@ TEST_F(WrappedSplat, ArchivesOfOtherThings) {
   As("a.gltf");
   EXPECT_CONTAINS(ErrorOf(Zip("a.zip", {{"a.gltf", FileBytes(folder_ / "a.gltf")}, {"a.bin", "x"}})),
                   "a.gltf: consists of several files (a.bin is one of them), which cannot be read from memory or");
-  EXPECT_CONTAINS(ErrorOf(Zip("a.zip", {{"notes.txt", "something else"}})), "notes.txt: byte 0: is no splat file");
+  EXPECT_CONTAINS(ErrorOf(Zip("a.zip", {{"notes.txt", "something else"}})),
+                  "notes.txt: byte 0: is not in a known splat format");
   EXPECT_CONTAINS(ErrorOf(Zip("a.zip", {{"deep.zip", ply}})), "accepted");  // by its content
   // A SOG is an archive itself, whatever it is called, and so is a folder that somebody has packed.
   EXPECT_EQ(ExpectSame(File("sog.zip", sog), folder_ / "a.sog"), "");
@@ -226,7 +227,7 @@ TEST_F(WrappedSplat, EachFormatUnderEachName) {
                                    ".pt", ".zip", ".csv", ".bin", ""}) {
       const fs::path wrong = File("wrong" + name, bytes);
       if (is == ".splat" && FormatOfExtension(wrong) == nullptr) {  // which has no mark, and --from is for
-        EXPECT_CONTAINS(ErrorOf(wrong), "is no splat file of a known format");
+        EXPECT_CONTAINS(ErrorOf(wrong), "is not in a known splat format");
       } else {
         EXPECT_EQ(ExpectSame(wrong, folder_ / ("right" + is)), "") << is << " as " << name;
       }
@@ -242,21 +243,22 @@ TEST_F(WrappedSplat, SaysWhatIsNoSplat) {
     }
   };
   expect("", "is empty");
-  expect("\r\n <!DOCTYPE HTML><html>" + std::string(100, ' '), "is a web page and no splat");
-  expect("\xef\xbb\xbf<HTML lang='en'>", "is a web page and no splat");
+  expect("\r\n <!DOCTYPE HTML><html>" + std::string(100, ' '), "is a web page, not a splat");
+  expect("\xef\xbb\xbf<HTML lang='en'>", "is a web page, not a splat");
   expect("<?xml version='1.0'?><Error><Code>AccessDenied</Code>", "is an XML document");
-  expect("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 12345\n", "is a pointer of Git LFS");
-  expect("BZh91AY&SY" + std::string(50, 'x'), "is packed with bzip2, which is not read: unpack it with bunzip2");
+  expect("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 12345\n", "is a Git LFS pointer");
+  expect("BZh91AY&SY" + std::string(50, 'x'),
+         "is compressed with bzip2, which is not supported: decompress it with bunzip2");
   expect(std::string("\xfd"
                      "7zXZ\0",
                      6) +
              std::string(50, 'x'),
-         "is packed with xz");
+         "is compressed with xz");
   expect("Rar!\x1a\x07" + std::string(50, 'x'), "is a RAR archive");
   expect("7z\xbc\xaf\x27\x1c" + std::string(50, 'x'), "is a 7z archive");
   EXPECT_CONTAINS(ErrorOf(File("a.splat", "404: Not Found\n")),
-                  "is no .splat file but text; it begins with \"404: Not Found");
-  EXPECT_CONTAINS(ErrorOf(File("a.ksplat", "{\"message\": \"no\"}")), "is no .ksplat file but text");
+                  "is text, not a .splat file; it begins with \"404: Not Found");
+  EXPECT_CONTAINS(ErrorOf(File("a.ksplat", "{\"message\": \"no\"}")), "is text, not a .ksplat file");
   expect(std::string(257, 'x') + "ustar" + std::string(250, '\0'), "is a tar archive");
 }
 

@@ -62,7 +62,7 @@ std::string CreditLoss(const SplatFormat& format, std::span<const std::string> c
   if (credits.empty() || format.comments != CommentPlace::kNone) return {};
   std::string list;
   for (const std::string& credit : credits) list += Cat(list.empty() ? "\"" : ", \"", Printable(credit), "\"");
-  return Cat(AFileOf(format), " has no place for credits: give ", list, " beside it");
+  return Cat(AFileOf(format), " cannot store credits: publish ", list, " with it");
 }
 
 // Read back, the splat may look as if it had lost width.
@@ -70,25 +70,24 @@ std::string MarkLoss(const SplatFormat& format, std::span<const std::string> com
   if (format.comments != CommentPlace::kNone) return {};
   if (std::ranges::none_of(comments, IsMark)) return {};
   const bool part = HasMark(comments, kPartEnhancedMark), enhanced = HasMark(comments, kEnhancedMark);
-  return Cat(AFileOf(format), " has no place for the word that the splat has ",
-             part ? "been enhanced in part: enhance all of that file, and the part becomes worse (keep a PLY for that)"
-             : enhanced
-                 ? "been enhanced; its Gaussians nearly always tell, but keep a PLY of what may be enhanced again"
-                 : "been fitted to the areas of pixels: enhance that file, and it becomes worse (keep a PLY for that)");
+  return Cat(AFileOf(format), " cannot store that the splat was ",
+             part       ? "partly enhanced: enhancing the whole file would make that part worse (keep a PLY for that)"
+             : enhanced ? "enhanced: its Gaussians nearly always show it, but keep a PLY to be sure"
+                        : "fitted to pixel areas: enhancing the file would make it worse (keep a PLY for that)");
 }
 
 // SPZ records kept in comments, which only SPZ stores.
 std::string SpzRecordLoss(const SplatFormat& format, std::span<const std::string> comments) {
   if (format.comments == CommentPlace::kAll || format.declared_axes == DeclaredAxesOfSpz) return {};
   const std::string names = NamesOfSpzExtensions(comments);
-  return names.empty() ? std::string() : Cat(AFileOf(format), " has no place for ", names, ": dropped");
+  return names.empty() ? std::string() : Cat(AFileOf(format), " cannot store ", names, ": dropped");
 }
 
 // Readers of such a file assume the usual axis.
 std::string UpLoss(const SplatFormat& format, std::span<const std::string> comments) {
   const auto up = UpOf({comments.begin(), comments.end()});
   if (!up || *up == kUsualUp || format.comments != CommentPlace::kNone) return {};
-  return Cat(AFileOf(format), " has no place for where up is, ", (*up)[0], " ", (*up)[1], " ", (*up)[2],
+  return Cat(AFileOf(format), " cannot store the up direction, ", (*up)[0], " ", (*up)[1], " ", (*up)[2],
              ": viewers assume the usual axis (convert --up turns the splat)");
 }
 
@@ -97,19 +96,19 @@ std::string ModeLoss(const SplatFormat& format, std::optional<RenderMode> mode) 
   if (!IsCompensated(mode) || format.mode_tag == ModeTag::kEach) return {};
   const std::string_view name = NameOf(*mode);
   if (format.mode_tag == ModeTag::kNone) {
-    return Cat(AFileOf(format), " has no place for the render mode ", name,
-               ": the splat will be drawn as a classic one (--mode ", name, " where a verb has it)");
+    return Cat(AFileOf(format), " cannot store the render mode ", name,
+               ": the splat will be drawn as classic (pass --mode ", name, " to verbs that have it)");
   }
   if (*mode == RenderMode::kAntialiased) return {};
-  return Cat(AFileOf(format), " only says that opacity is compensated, not that the render mode is ", name,
+  return Cat(AFileOf(format), " can only store that opacity is compensated, not the render mode ", name,
              ": the splat will be drawn with a dilation of ", DilationOf(RenderMode::kAntialiased), " px² instead of ",
-             DilationOf(*mode), " (--mode ", name, " where a verb has it)");
+             DilationOf(*mode), " (pass --mode ", name, " to verbs that have it)");
 }
 
 std::string OriginLoss(const SplatFormat& format, const WorldOrigin& origin) {
   if (format.keeps_origin || IsZero(origin)) return {};
-  return Cat(AFileOf(format), " has no place for the origin of its positions: they are relative to ", TextOf(origin),
-             "; keep these numbers beside it");
+  return Cat(AFileOf(format), " cannot store the origin of its positions: they are relative to ", TextOf(origin),
+             "; keep these numbers with it");
 }
 
 }  // namespace
@@ -118,7 +117,7 @@ std::vector<std::string> WriteLosses(const SplatFormat& format, const CloudView&
   const FormatRange& range = format.range;
   std::vector<std::string> losses;
   if (cloud.sh_degree > range.sh_degree) {
-    losses.push_back(Cat(AFileOf(format), " has no place for spherical harmonics beyond degree ", range.sh_degree,
+    losses.push_back(Cat(AFileOf(format), " cannot store spherical harmonics above degree ", range.sh_degree,
                          ": those of degree ", range.sh_degree + 1, " to ", cloud.sh_degree,
                          " are dropped, so colours no longer change with the view"));
   }

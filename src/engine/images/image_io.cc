@@ -56,15 +56,15 @@ Result<PictureKind> DetectKind(const OpenedFile& file, const std::string& name) 
   }
   if (const std::string other = OtherKind(head); !other.empty()) {
     return Error{ErrorCode::kBadFile,
-                 Cat(name, ": is ", other, " picture, which is not read here; convert it to JPEG or PNG")};
+                 Cat(name, ": is ", other, " picture, which is not supported; convert it to JPEG or PNG")};
   }
-  return Error{ErrorCode::kBadFile, Cat(name, ": byte 0: neither a PNG nor a JPEG, WebP or TIFF")};
+  return Error{ErrorCode::kBadFile, Cat(name, ": byte 0: not a PNG, JPEG, WebP or TIFF")};
 }
 
 Result<std::string> AllOf(const OpenedFile& file, const std::string& name) {
   std::string bytes(file.size, '\0');
   if (std::fread(bytes.data(), 1, bytes.size(), file.handle.get()) != bytes.size()) {
-    return Error{ErrorCode::kIo, Cat(name, ": cannot be read to its end")};
+    return Error{ErrorCode::kIo, Cat(name, ": cannot be read completely")};
   }
   return bytes;
 }
@@ -89,7 +89,7 @@ Result<Image> DecodeImage(const std::string& name, std::string_view bytes) {
   file.size = bytes.size();
   // Read-only, so the pointer is never written through. Zero bytes are not a file on every system.
   if (!bytes.empty()) file.handle.reset(::fmemopen(const_cast<char*>(bytes.data()), bytes.size(), "rb"));
-  if (!file.handle) return Error{ErrorCode::kBadFile, Cat(name, ": byte 0: neither a PNG nor a JPEG, WebP or TIFF")};
+  if (!file.handle) return Error{ErrorCode::kBadFile, Cat(name, ": byte 0: not a PNG, JPEG, WebP or TIFF")};
   return Decode(file, name);
 }
 

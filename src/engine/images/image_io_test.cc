@@ -303,7 +303,7 @@ TEST(ReadImage, OtherFilesAreErrors) {
   Write(folder / "a.png", std::string("\0\0\0\x18"
                                       "ftypheic\0\0\0\0",
                                       16));
-  EXPECT_NE(ReadImage(folder / "a.png").error().message.find("is a HEIC picture, which is not read here; convert"),
+  EXPECT_NE(ReadImage(folder / "a.png").error().message.find("is a HEIC picture, which is not supported; convert"),
             std::string::npos);
 }
 

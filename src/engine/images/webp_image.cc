@@ -20,8 +20,7 @@ Result<WebPBitstreamFeatures> FeaturesOf(const std::string& where, std::string_v
     return Error{ErrorCode::kBadFile, Cat(where, ": the WebP picture is damaged or cut off")};
   }
   if (features.has_animation != 0) {
-    return Error{ErrorCode::kBadFile,
-                 Cat(where, ": an animated WebP; save the one picture that is meant in a file of its own")};
+    return Error{ErrorCode::kBadFile, Cat(where, ": an animated WebP; save the picture you need as a separate file")};
   }
   return features;
 }
@@ -80,7 +79,7 @@ Result<ByteImage> DecodeWebp(const std::string& where, std::string_view bytes, i
   const auto* data = reinterpret_cast<const uint8_t*>(bytes.data());
   ByteImage image;
   if (WebPGetInfo(data, bytes.size(), &image.width, &image.height) == 0) {
-    return Error{ErrorCode::kBadFile, Cat(where, ": byte 0: is no WebP picture")};
+    return Error{ErrorCode::kBadFile, Cat(where, ": byte 0: is not a WebP picture")};
   }
   if (image.pixels() < min_pixels || image.pixels() > max_pixels) {
     return Error{ErrorCode::kBadFile, Cat(where, ": has ", image.width, " x ", image.height, " pixels, expected ",

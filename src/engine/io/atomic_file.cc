@@ -120,7 +120,7 @@ Result<OutputFile> OutputFile::Create(const fs::path& path, bool overwrite, Outp
   }
   if (path == "-") {
     return Error{ErrorCode::kBadArgument,
-                 "-: this is not written to standard output; give it a name (./- is a file called so)"};
+                 "-: cannot be written to standard output; pass a file name (./- names a file)"};
   }
 
   mode_t mode = 0666;  // minus the umask, like any new file
@@ -237,7 +237,7 @@ Status OutputFile::FinishBytes() {
     const int error = NameTheNameless(descriptor_, name);
     if (error == 0) temporary_ = std::move(name);
     // Left by a killed process with our pid, or by one with our pid in another container.
-    if (error != 0 && error != EEXIST) return WriteError(path_, "give the file its name", error);
+    if (error != 0 && error != EEXIST) return WriteError(path_, "rename the file", error);
   }
   RecordWritten(descriptor_);
   // close() is where network file systems report what they could not write.
@@ -273,7 +273,7 @@ Status OutputFile::TakeName(bool keep_old) {
     error = RenameToNewName(temporary_.c_str(), target_.c_str());
   }
   if (error == EEXIST) return AlreadyThere(path_);
-  if (error != 0) return WriteError(path_, "give the file its name", error);
+  if (error != 0) return WriteError(path_, "rename the file", error);
   temporary_.clear();
   return {};
 }
@@ -286,7 +286,7 @@ Status OutputFile::RestoreOldFile() {
   if (old_.empty()) return ::unlink(target_.c_str()) == 0 ? Status() : Status(WriteError(path_, "remove", errno));
   const fs::path old = std::exchange(old_, {});
   if (::rename(old.c_str(), target_.c_str()) == 0) return {};
-  return WriteError(path_, Cat("put back what was there, which is kept as ", old.string()).c_str(), errno);
+  return WriteError(path_, Cat("restore the previous file, which is kept as ", old.string()).c_str(), errno);
 }
 
 Status OutputFile::Commit() { return CommitTogether({this, 1}); }

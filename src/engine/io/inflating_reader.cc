@@ -194,8 +194,8 @@ Status InflatingReader::Read(void* out, size_t size) {
 Status InflatingReader::ExpectEnd() {
   uint8_t beyond = 0;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t read, ReadSome(&beyond, 1));
-  if (read > 0) return Bad("", " goes on behind its data");
-  return TrailingBytes() == 0 ? Status() : Status(Bad("there are bytes behind ", ""));
+  if (read > 0) return Bad("", " continues after its data");
+  return TrailingBytes() == 0 ? Status() : Status(Bad("there are bytes after ", ""));
 }
 
 std::unique_ptr<CopyableReader> OpenPlain(const InputFile& file, uint64_t begin) {

@@ -87,7 +87,7 @@ Result<InputFile> InputFile::Open(const std::filesystem::path& path) {
     static std::atomic<bool> was_read = false;
     if (is_standard_input && bytes.empty() && was_read) {
       return Error{ErrorCode::kBadArgument,
-                   Cat(name, ": standard input is a pipe and has been read already: it can be one input only")};
+                   Cat(name, ": standard input is a pipe and was read already: it can be only one input")};
     }
     was_read = was_read || (is_standard_input && !bytes.empty());
     ::close(std::exchange(file.descriptor_, -1));
@@ -187,8 +187,8 @@ Result<std::string> InputFile::Head(size_t size) const {
 
 Result<std::string> InputFile::ReadAll(uint64_t max_size) const {
   if (size_ > max_size) {
-    return Error{ErrorCode::kBadFile, Cat(name(), ": has ", HumanBytes(size_), ", at most ", HumanBytes(max_size),
-                                          " expected for such a file")};
+    return Error{ErrorCode::kBadFile, Cat(name(), ": has ", HumanBytes(size_), ", more than the limit of ",
+                                          HumanBytes(max_size), " for such a file")};
   }
   return Head(static_cast<size_t>(size_));
 }

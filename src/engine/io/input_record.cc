@@ -120,9 +120,8 @@ Status CheckNotInput(const fs::path& output) {
   const std::lock_guard lock(state.mutex);
   const auto same = state.inputs.find(*identity);
   if (same == state.inputs.end()) return {};
-  return Error{ErrorCode::kBadArgument,
-               Cat(output.string(), ": is the input ", same->second,
-                   " itself, which would be lost; write to another name and rename it when you are content")};
+  return Error{ErrorCode::kBadArgument, Cat(output.string(), ": is the input ", same->second,
+                                            " itself, which would be lost; write to another name")};
 }
 
 Status CheckHoldsNoInput(const fs::path& folder) {

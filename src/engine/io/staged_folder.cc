@@ -20,7 +20,7 @@ Result<StagedFolder> StagedFolder::Create(const fs::path& file) {
   std::error_code failed;
   fs::remove_all(path, failed);  // left by a killed run
   if (!failed) fs::create_directory(path, failed);
-  if (failed) return Error{ErrorCode::kIo, Cat(path.string(), ": cannot make this folder: ", failed.message())};
+  if (failed) return Error{ErrorCode::kIo, Cat(path.string(), ": cannot create this folder: ", failed.message())};
   staged.path_ = path;
   return staged;
 }
@@ -43,10 +43,10 @@ Status StagedFolder::Publish(std::span<const std::string> from, std::span<const 
     std::error_code failed;
     // A rename would replace an empty folder.
     if (fs::symlink_status(target, failed).type() != fs::file_type::not_found) {
-      return Error{ErrorCode::kIo, Cat(target.string(), ": something of that name has come into being")};
+      return Error{ErrorCode::kIo, Cat(target.string(), ": was created by another program meanwhile")};
     }
     fs::rename(path_ / from[k], target, failed);
-    if (failed) return Error{ErrorCode::kIo, Cat(target.string(), ": cannot be given its name: ", failed.message())};
+    if (failed) return Error{ErrorCode::kIo, Cat(target.string(), ": cannot be renamed: ", failed.message())};
     published_.push_back(target);
   }
   return {};

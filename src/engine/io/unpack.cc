@@ -39,9 +39,8 @@ Status WarnOfBytesBehind(const InputFile& file, uint64_t behind, Packing packing
   const uint64_t begin = file.size() - behind;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const bool zeros, AreZeros(file, begin));
   if (zeros) return {};
-  LogWarning(Cat(file.name(), ": byte ", WithThousands(static_cast<int64_t>(begin)), ": the ",
-                 WithThousands(static_cast<int64_t>(behind)), " bytes behind its ", NameOf(packing),
-                 " stream are not read"));
+  LogWarning(Cat(file.name(), ": byte ", WithThousands(static_cast<int64_t>(begin)), ": ignoring ",
+                 WithThousands(static_cast<int64_t>(behind)), " bytes after its ", NameOf(packing), " stream"));
   return {};
 }
 

@@ -108,7 +108,7 @@ Result<std::string> ZipReader::Read(const std::string& member, uint64_t max_size
   if (entry == entries_.end()) return Error{ErrorCode::kBadFile, Cat(where, ": is not in the archive")};
   if (entry->size > max_size) {
     return Error{ErrorCode::kBadFile,
-                 Cat(where, ": has ", HumanBytes(entry->size), ", at most ", HumanBytes(max_size), " expected")};
+                 Cat(where, ": has ", HumanBytes(entry->size), ", more than the limit of ", HumanBytes(max_size))};
   }
   std::string contents;
   if (entry->method == 0) {
@@ -121,7 +121,7 @@ Result<std::string> ZipReader::Read(const std::string& member, uint64_t max_size
     return Error{ErrorCode::kBadFile, Cat(where, ": is compressed by method ", entry->method, ", expected 0 or 8")};
   }
   if (Crc(0, contents) != entry->crc) {
-    return Error{ErrorCode::kBadFile, Cat(where, ": is damaged: its check sum is another")};
+    return Error{ErrorCode::kBadFile, Cat(where, ": is damaged: wrong check sum")};
   }
   return contents;
 }

@@ -52,7 +52,7 @@ class DirectoryReader {
       ANCHORSPLAT_RETURN_IF_ERROR(ReadCentral(at, end, directory.offset, entries, extents));
       if (!names.insert(entries.back().name).second) return Bad(at, entries.back().name, "occurs twice");
     }
-    if (at != end) return Bad(at, Cat("the zip directory goes on after its ", directory.entries, " entries"));
+    if (at != end) return Bad(at, Cat("the zip directory continues after its ", directory.entries, " entries"));
     std::sort(extents.begin(), extents.end(), [](const Extent& a, const Extent& b) { return a.begin < b.begin; });
     for (size_t i = 1; i < extents.size(); ++i) {
       if (extents[i].begin < extents[i - 1].end) return Bad(extents[i].begin, extents[i].name, "overlaps another");

@@ -94,7 +94,7 @@ Result<ColorMap> FitColors(const Image& image, const Image& truth) {
                      truth.width, " x ", truth.height, " x ", truth.channels)};
   }
   if (image.channels < 3 || image.plane() < 1) {
-    return Error{ErrorCode::kBadArgument, "colours are fitted of pictures with pixels and three channels"};
+    return Error{ErrorCode::kBadArgument, "colour correction needs pictures with pixels and three channels"};
   }
   const Moments sum = MomentsOf(image, truth);
   const auto n = static_cast<double>(image.plane());

@@ -123,8 +123,8 @@ Result<MaskedQuality> MeasureMasked(const Image& a, const Image& b, std::span<co
 
 std::string WhollyMasked(std::span<const std::string> names, int64_t count) {
   constexpr size_t kShown = 10;
-  std::string text = Cat("a mask leaves nothing of ", names.size(), " of ", count,
-                         " views, which are left out (black is left out, white counts): ");
+  std::string text = Cat("masks hide every pixel of ", names.size(), " of ", count,
+                         " views, which are skipped (black hides a pixel, white uses it): ");
   for (size_t i = 0; i < std::min(kShown, names.size()); ++i) text += Cat(i == 0 ? "" : ", ", Printable(names[i]));
   if (names.size() > kShown) text += Cat(" and ", names.size() - kShown, " more");
   return text;

@@ -254,7 +254,7 @@ Status CheckArguments(std::span<const LabelledImage> images, const SideBySideOpt
   for (const LabelledImage& entry : images) {
     if (entry.image->width != first.width || entry.image->height != first.height) {
       return bad(Cat("images of ", first.width, " x ", first.height, " and ", entry.image->width, " x ",
-                     entry.image->height, " cannot stand side by side"));
+                     entry.image->height, " cannot be shown side by side: the sizes differ"));
     }
   }
   if (!(options.crop > 0 && options.crop <= 1)) return bad(Cat("crop ", options.crop, " is not in (0, 1]"));

@@ -171,7 +171,7 @@ TEST(TorchFile, ZipDirectoryLiesAreErrors) {
     changed.replace(at, bytes.size(), bytes);
     return ErrorOf(changed);
   };
-  EXPECT_THAT(with(end + 10, Little(uint16_t{2})), HasSubstr("goes on after its 2 entries"));
+  EXPECT_THAT(with(end + 10, Little(uint16_t{2})), HasSubstr("continues after its 2 entries"));
   EXPECT_THAT(with(end + 10, Little(uint16_t{4})), HasSubstr("of 167 bytes cannot hold 4 entries"));
   EXPECT_THAT(with(end + 10, Little(uint16_t{0xffff})), HasSubstr("cannot hold 65535 entries"));
   EXPECT_THAT(with(last, "PK\x01\x03"), HasSubstr("an entry of the zip directory was expected"));

@@ -127,14 +127,14 @@ Texture WallPicture(uint64_t seed, int wall) {
 Status AddBackdrop(Mesh& mesh, double half_side, uint64_t seed) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(mesh));
   if (!(half_side > 0 && std::isfinite(half_side))) {
-    return Error{ErrorCode::kBadArgument, Cat("a room of half side ", half_side)};
+    return Error{ErrorCode::kBadArgument, Cat("half side ", half_side, " of a room is not a positive length")};
   }
   const float half = static_cast<float>(half_side);
   for (const auto& triangle : mesh.triangles) {
     for (const uint32_t corner : triangle) {
       for (const float x : mesh.positions[corner]) {
         if (!(std::abs(x) < half)) {
-          return Error{ErrorCode::kBadArgument, Cat("the object reaches out of a room of half side ", half_side)};
+          return Error{ErrorCode::kBadArgument, Cat("the object does not fit into a room of half side ", half_side)};
         }
       }
     }

@@ -67,7 +67,7 @@ class DatasetBuild {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const auto earlier, ReadFailures(dataset_));
     JobList todo = ListJobs(meshes, options_.recipe, manifest_, earlier);
     if (todo.jobs.empty() && todo.failures.empty()) {
-      return Error{ErrorCode::kBadArgument, "the libraries have no object to build a data set of"};
+      return Error{ErrorCode::kBadArgument, "the libraries contain no objects to build a data set from"};
     }
     jobs_ = std::move(todo.jobs);
     for (ObjectJob& job : jobs_) {
@@ -131,8 +131,8 @@ class DatasetBuild {
       const bool remade = !options_.overwrite || unfinished_.count(job->base) == 0;
       if (manifest_.count(job->base) > 0 && failures_.count(job->base) == 0 && remade) return false;
       Fail({job->name, job->source, kBaseStage,
-            Cat("is made from ", job->base, ", which is not there",
-                failures_.count(job->base) > 0 ? " because it failed; --retry tries both again" : "")});
+            Cat("is made from ", job->base, ", which is missing",
+                failures_.count(job->base) > 0 ? " because it failed; --retry retries both" : "")});
       unfinished_.erase(job->name);
       progress_->Advance(1, job->name);
       return true;
@@ -247,14 +247,14 @@ class DatasetBuild {
 };
 
 Result<FileLock> TakeDataset(const std::vector<std::string>& meshes, const fs::path& dataset) {
-  if (meshes.empty()) return Error{ErrorCode::kBadArgument, "no meshes to build a data set of"};
+  if (meshes.empty()) return Error{ErrorCode::kBadArgument, "no meshes to build a data set from"};
   const fs::path building = dataset / kBuildingName;
   std::error_code code;
   fs::create_directories(building, code);
-  if (code) return Error{ErrorCode::kIo, Cat(building.string(), ": cannot make this folder: ", code.message())};
+  if (code) return Error{ErrorCode::kIo, Cat(building.string(), ": cannot create this folder: ", code.message())};
   auto lock = FileLock::Take(building / "lock", false);
   if (!lock.ok() && lock.error().code == ErrorCode::kExists) {
-    return Error{ErrorCode::kExists, Cat(dataset.string(), ": another build is at work here")};
+    return Error{ErrorCode::kExists, Cat(dataset.string(), ": another build is running here")};
   }
   return lock;
 }

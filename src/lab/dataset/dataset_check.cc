@@ -32,7 +32,7 @@ class ObjectCheck {
 
   std::vector<DatasetProblem> Run() && {
     if (!IsFolder(folder_)) {
-      Complain(Cat(folder_.string(), ": the manifest has it, the folder is missing"));
+      Complain(Cat(folder_.string(), ": is in the manifest, but the folder is missing"));
       return std::move(problems_);
     }
     CheckRecord();
@@ -163,14 +163,14 @@ Status CheckFinished(const fs::path& dataset, const Manifest& manifest, std::vec
   for (const UnfinishedObject& object : unfinished) {
     std::string sentence;
     if (!object.listed) {
-      sentence = Cat(object.folder.string(),
-                     ": was begun and is not finished; the dataset build that began it goes on, or remove the folder");
+      sentence =
+          Cat(object.folder.string(), ": is unfinished. Continue with the same dataset build, or remove the folder");
     } else if (manifest.count(object.name) > 0) {
       sentence = Cat((dataset / object.name).string(),
-                     ": is from before; the build that was to make it again has not ended, the same one goes on");
+                     ": is outdated: the build that replaces it was interrupted. Continue with the same dataset build");
     } else {
       sentence = Cat((dataset / object.name).string(),
-                     ": the build that was to make it has not ended; the same dataset build goes on");
+                     ": is missing: its build was interrupted. Continue with the same dataset build");
     }
     problems.push_back({object.name, std::move(sentence)});
   }
@@ -194,8 +194,7 @@ Result<std::vector<DatasetProblem>> CheckDataset(const fs::path& dataset, const 
   for (fs::directory_iterator it(dataset, code), end; !code && it != end; it.increment(code)) {
     const std::string name = it->path().filename().string();
     if (Exists(it->path() / kRecordName) && manifest.count(name) == 0 && !name.starts_with(".")) {
-      problems.push_back(
-          {name, Cat(it->path().string(), ": the manifest does not know this object; dataset build adds it")});
+      problems.push_back({name, Cat(it->path().string(), ": is not in the manifest; dataset build adds it")});
     }
   }
   for (auto& list : found) problems.insert(problems.end(), list.begin(), list.end());

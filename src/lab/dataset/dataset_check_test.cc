@@ -86,7 +86,7 @@ TEST_F(DatasetCheckTest, FindsPartedModelsAndUnknownObjects) {
   EXPECT_NE(problems.find("c | "), std::string::npos);
   manifest_.erase("b");
   ASSERT_TRUE(WriteManifest(set_, manifest_).ok());
-  EXPECT_NE(Problems().find("does not know this object"), std::string::npos);
+  EXPECT_NE(Problems().find("is not in the manifest"), std::string::npos);
 }
 
 TEST_F(DatasetCheckTest, FindsWhatAKilledBuildLeft) {
@@ -95,8 +95,8 @@ TEST_F(DatasetCheckTest, FindsWhatAKilledBuildLeft) {
   fs::create_directories(BuildingFolder(set_, "broken"));
   ASSERT_TRUE(WriteFailures(set_, {{"broken", "x.obj", "mesh", "broken"}}).ok());
   const std::string problems = Problems();
-  EXPECT_NE(problems.find("b | " + (set_ / "b").string() + ": is from before"), std::string::npos) << problems;
-  EXPECT_NE(problems.find("c | " + (set_ / "c").string() + ": the build that was to make it has not ended"),
+  EXPECT_NE(problems.find("b | " + (set_ / "b").string() + ": is outdated"), std::string::npos) << problems;
+  EXPECT_NE(problems.find("c | " + (set_ / "c").string() + ": is missing: its build was interrupted"),
             std::string::npos);
   EXPECT_NE(problems.find("d | "), std::string::npos);
   EXPECT_EQ(std::count(problems.begin(), problems.end(), '\n'), 3) << "what failed is no part of it";

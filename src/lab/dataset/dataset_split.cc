@@ -61,7 +61,7 @@ std::vector<std::vector<std::string>> VariantGroups(const Manifest& manifest, bo
 Result<Splits> SplitByModel(const Manifest& manifest, const SplitFractions& fractions, uint64_t seed) {
   if (!(fractions.validation >= 0 && fractions.test >= 0 && fractions.validation + fractions.test <= 1)) {
     return Error{ErrorCode::kBadArgument, Cat("fractions ", fractions.validation, " for validation and ",
-                                              fractions.test, " for test do not fit into a whole")};
+                                              fractions.test, " for test add up to more than 1 or are negative")};
   }
   Splits splits;
   for (const auto& group : VariantGroups(manifest, true)) {
@@ -113,7 +113,7 @@ Result<Splits> ReadSplits(const fs::path& dataset) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const auto elements, list.Elements());
     for (const JsonValue& element : elements) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string name, element.Text());
-      if (!splits.emplace(name, split).second) return element.Complain(Cat(Printable(name), " is there twice"));
+      if (!splits.emplace(name, split).second) return element.Complain(Cat(Printable(name), " is listed twice"));
     }
   }
   return splits;
@@ -123,7 +123,8 @@ Status WriteSplits(const fs::path& dataset, const Splits& splits) {
   nlohmann::json json;
   for (const char* split : kSplitNames) json[split] = nlohmann::json::array();
   for (const auto& [name, split] : splits) {
-    if (!IsSplitName(split)) return Error{ErrorCode::kBadArgument, Cat("\"", split, "\" is no split")};
+    if (!IsSplitName(split))
+      return Error{ErrorCode::kBadArgument, Cat("\"", split, "\" is not a split (train, validation or test)")};
     json[split].push_back(name);
   }
   return WriteWholeFile(dataset / kSplitsName,
@@ -163,11 +164,12 @@ Result<std::vector<std::string>> ResolveAddresses(const std::vector<std::string>
     auto& found = libraries[file.string()];
     if (found.empty()) {
       return Error{ErrorCode::kNotFound,
-                   Cat(address, ": not below ", objects.string(), " (scripts/fetch-objects.sh fetches it)")};
+                   Cat(address, ": not found below ", objects.string(), " (fetch it with scripts/fetch-objects.sh)")};
     }
     std::sort(found.begin(), found.end());
     if (found.size() > 1) {
-      return Error{ErrorCode::kBadArgument, Cat(address, ": both ", found[0].string(), " and ", found[1].string())};
+      return Error{ErrorCode::kBadArgument,
+                   Cat(address, ": matches both ", found[0].string(), " and ", found[1].string())};
     }
     out.push_back(found[0].string() + object);
   }

@@ -39,7 +39,7 @@ Status Link(const fs::path& from, const fs::path& to) {
 Status LinkFolder(const fs::path& from, const fs::path& to, const std::set<std::string>& without) {
   std::error_code code;
   fs::create_directories(to, code);
-  if (code) return Error{ErrorCode::kIo, Cat(to.string(), ": cannot make this folder: ", code.message())};
+  if (code) return Error{ErrorCode::kIo, Cat(to.string(), ": cannot create this folder: ", code.message())};
   for (fs::directory_iterator it(from, code), end; !code && it != end; it.increment(code)) {
     const fs::path name = it->path().filename();
     if (without.contains(name.string())) continue;
@@ -53,7 +53,7 @@ Status LinkFolder(const fs::path& from, const fs::path& to, const std::set<std::
 
 Status RunEnhance(const fs::path& program, const fs::path& splat, const fs::path& low, double upscale,
                   const fs::path& output) {
-  if (program.empty()) return Error{ErrorCode::kBadArgument, "nothing to enhance with: the caller named no program"};
+  if (program.empty()) return Error{ErrorCode::kBadArgument, "nothing to enhance with: no program was given"};
   const fs::path log = output.string() + ".log";
   ProcessEnd how;
   ANCHORSPLAT_RETURN_IF_ERROR(RunProcesses(
@@ -68,7 +68,7 @@ Status RunEnhance(const fs::path& program, const fs::path& splat, const fs::path
         return true;
       },
       {}));
-  if (StopRequested()) return Error{ErrorCode::kInterrupted, Cat(splat.string(), ": stopped while it was enhanced")};
+  if (StopRequested()) return Error{ErrorCode::kInterrupted, Cat(splat.string(), ": stopped while enhancing")};
   if (!how.ok()) return Error{ErrorCode::kIo, Cat(splat.string(), ": enhance: ", LastWords(log))};
   return {};
 }
@@ -78,14 +78,14 @@ Status RunEnhance(const fs::path& program, const fs::path& splat, const fs::path
 Result<ObjectRecord> TakeViewsOfBase(const ObjectJob& job, const fs::path& dataset, const fs::path& folder) {
   const fs::path base = dataset / job.base;
   if (!IsFile(base / kRecordName)) {
-    return Error{ErrorCode::kNotFound, Cat(job.name, ": is made from ", base.string(), ", which is not there")};
+    return Error{ErrorCode::kNotFound, Cat(job.name, ": is made from ", base.string(), ", which is missing")};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonFile json, JsonFile::Read(base / kRecordName));
   ANCHORSPLAT_ASSIGN_OR_RETURN(ObjectRecord record, ObjectRecordFrom(json.root()));
   if (Shared(record.settings) != Shared(job.settings)) {
     return Error{ErrorCode::kBadArgument,
                  Cat(job.name, ": is made from ", base.string(),
-                     ", which was made with other settings than the recipe has now; -w makes both again")};
+                     ", which was made with other settings than the recipe's; -w makes both again")};
   }
   ANCHORSPLAT_RETURN_IF_ERROR(LinkFolder(base, folder, {kRecordName, kSplatName, "gaussian_splatting", "job.json"}));
   return record;

@@ -69,7 +69,7 @@ Result<KeptFit> FitAndKeep(const fs::path& folder, const std::string& key,
     fs::remove_all(folder, code);
   }
   fs::create_directories(folder, code);
-  if (code) return Error{ErrorCode::kIo, Cat(folder.string(), ": cannot make this folder: ", code.message())};
+  if (code) return Error{ErrorCode::kIo, Cat(folder.string(), ": cannot create this folder: ", code.message())};
   ANCHORSPLAT_RETURN_IF_ERROR(WriteProgress(note, progress));
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(FitTask begin, start());

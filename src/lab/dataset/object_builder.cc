@@ -49,7 +49,7 @@ Status Remove(const fs::path& path) {
 Status MakeFolder(const fs::path& path) {
   std::error_code code;
   fs::create_directories(path, code);
-  if (code) return Error{ErrorCode::kIo, Cat(path.string(), ": cannot make this folder: ", code.message())};
+  if (code) return Error{ErrorCode::kIo, Cat(path.string(), ": cannot create this folder: ", code.message())};
   return {};
 }
 
@@ -115,7 +115,7 @@ Status MakeViews(const ObjectJob& job, const fs::path& folder, ObjectRecord& rec
 Status CopyViews(const ObjectJob& job, const fs::path& folder, ObjectRecord& record) {
   ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "views"));
   if (job.settings.backdrop) {
-    return Error{ErrorCode::kBadArgument, Cat(job.source, ": a backdrop is for meshes; these are pictures")};
+    return Error{ErrorCode::kBadArgument, Cat(job.source, ": a backdrop works only with meshes, not with pictures")};
   }
   PictureProjectOptions options;
   options.downscale = job.settings.downscale;
@@ -249,11 +249,12 @@ Status CheckPlace(const ObjectJob& job, const fs::path& target) {
   const fs::file_status there = fs::symlink_status(target, code);
   if (there.type() == fs::file_type::not_found || there.type() == fs::file_type::none) return {};
   if (there.type() != fs::file_type::directory) {
-    return Error{ErrorCode::kExists, Cat(target.string(), ": is in the way of the object's folder and is no folder")};
+    return Error{ErrorCode::kExists,
+                 Cat(target.string(), ": is a file where the object's folder should be; move it away")};
   }
   if (!IsFile(target / kRecordName)) {
     return Error{ErrorCode::kExists, Cat(target.string(),
-                                         ": is in the way of the object's folder and is no object of a "
+                                         ": is a folder where the object's should be, but not an object of a "
                                          "data set (it has no ",
                                          kRecordName, ")")};
   }
@@ -261,7 +262,7 @@ Status CheckPlace(const ObjectJob& job, const fs::path& target) {
   const fs::path folder = RealPath(target), source = RealPath(job.source);
   if (std::mismatch(folder.begin(), folder.end(), source.begin(), source.end()).first == folder.end()) {
     return Error{ErrorCode::kBadArgument, Cat(target.string(), ": holds the input ", job.source,
-                                              ", which would be lost with it; write to another data set")};
+                                              ", which would be overwritten; write to another data set")};
   }
   return CheckHoldsNoInput(target);
 }
@@ -279,7 +280,7 @@ Status Publish(const ObjectJob& job, const fs::path& folder, const fs::path& tar
   code.clear();
   if (there.type() != fs::file_type::not_found) fs::rename(target, replaced, code);
   if (!code) fs::rename(folder, target, code);
-  if (code) return Error{ErrorCode::kIo, Cat(target.string(), ": cannot give the object its name: ", code.message())};
+  if (code) return Error{ErrorCode::kIo, Cat(target.string(), ": cannot rename the finished object: ", code.message())};
   ANCHORSPLAT_RETURN_IF_ERROR(Remove(replaced));
   return Remove(target / kJobName);
 }
@@ -341,7 +342,7 @@ Status MakeObject(const ObjectJob& job, const fs::path& folder, ObjectRecord& re
   ANCHORSPLAT_RETURN_IF_ERROR(FitSplat(job, folder, record));
   record.rejected = record.train_psnr < job.settings.min_train_psnr;
   if (record.rejected) {
-    record.reason = Cat("PSNR on the fit's own training views is ", Fixed(record.train_psnr, 2), " dB, below ",
+    record.reason = Cat("PSNR of the fit on its training views is ", Fixed(record.train_psnr, 2), " dB, below ",
                         Fixed(job.settings.min_train_psnr, 2));
   }
   return {};

@@ -131,7 +131,7 @@ TEST(ObjectBuilder, ReplacesNothingThatIsNoFolder) {
   const auto record = BuildObject(job, folder / "set");
   ASSERT_FALSE(record.ok());
   EXPECT_EQ(record.error().code, ErrorCode::kExists);
-  EXPECT_NE(record.error().message.find("is no folder"), std::string::npos);
+  EXPECT_NE(record.error().message.find("is a file where"), std::string::npos);
   EXPECT_EQ(FileBytes(folder / "set/tetra"), "mine");
   // What was made waits for its place.
   fs::remove(folder / "set/tetra");
@@ -243,7 +243,7 @@ TEST(ObjectBuilder, SplatsThroughAFormatKeepTheirViews) {
   job.settings.after = "splat";
   const auto early = BuildObject(job, folder / "set");
   ASSERT_FALSE(early.ok());
-  EXPECT_NE(early.error().message.find("tetra--small, which is not there"), std::string::npos);
+  EXPECT_NE(early.error().message.find("tetra--small, which is missing"), std::string::npos);
   const auto first = BuildObject(base, folder / "set");
   ASSERT_TRUE(first.ok());
   const auto record = BuildObject(job, folder / "set");

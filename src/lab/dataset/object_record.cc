@@ -114,7 +114,7 @@ Result<ObjectRecord> ObjectRecordFrom(const JsonValue& json) {
                                                                    {"reason", &r.reason}}) {
     ANCHORSPLAT_RETURN_IF_ERROR(TakeText(json, key, *text));
   }
-  if (!IsFolderName(r.name)) return json.Complain(Cat("\"", Printable(r.name), "\" is no name of a folder"));
+  if (!IsFolderName(r.name)) return json.Complain(Cat("\"", Printable(r.name), "\" is not a folder name"));
   for (const auto& [key, count] :
        std::initializer_list<std::pair<const char*, int64_t*>>{{"triangles", &r.triangles},
                                                                {"textures", &r.textures},
@@ -162,7 +162,7 @@ Result<Manifest> ReadManifest(const fs::path& dataset) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(ObjectRecord record, ObjectRecordFrom(json));
     const std::string name = record.name;
     if (!manifest.emplace(name, std::move(record)).second) {
-      return json.Complain(Cat("object ", name, " is there twice"));
+      return json.Complain(Cat("object ", name, " is listed twice"));
     }
     return {};
   };
@@ -185,7 +185,7 @@ Result<Manifest> CollectRecords(const fs::path& dataset) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonFile json, JsonFile::Read(path));
     ANCHORSPLAT_ASSIGN_OR_RETURN(ObjectRecord record, ObjectRecordFrom(json.root()));
     if (record.name != it->path().filename().string()) {
-      return json.root().Complain(Cat("is about ", Printable(record.name), ", not about the folder it is in"));
+      return json.root().Complain(Cat("describes ", Printable(record.name), ", not the folder it is in"));
     }
     manifest.emplace(record.name, std::move(record));
   }

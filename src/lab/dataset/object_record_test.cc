@@ -60,7 +60,7 @@ TEST(ObjectRecord, MistakesNameTheirLine) {
   EXPECT_NE(message("{}\n").find("line 1"), std::string::npos);
   nlohmann::json escape = ToJson(Example("../../etc"));
   escape["source"] = "x";
-  EXPECT_NE(message(escape.dump() + "\n").find("no name of a folder"), std::string::npos);
+  EXPECT_NE(message(escape.dump() + "\n").find("not a folder name"), std::string::npos);
   nlohmann::json good = ToJson(Example("a"));
   good["source"] = "x";
   EXPECT_EQ(message(good.dump() + "\n\n"), "");

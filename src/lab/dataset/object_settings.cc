@@ -212,33 +212,32 @@ Status Validate(const ObjectSettings& s) {
   if (s.views.low_size >= s.views.high_size) {
     return bad(Cat("low views of ", s.views.low_size, " pixels must be smaller than high ones of ", s.views.high_size));
   }
-  if (s.views.points < 1) return bad("a fit needs surface samples to begin with");
-  if (s.fit_steps < 1 || s.fit_steps > 10'000'000)
-    return bad(Cat("a fit has 1 to 10,000,000 steps, not ", s.fit_steps));
-  if (s.downscale < 2 || s.downscale > 64)
-    return bad(Cat("pictures are made 2 to 64 times smaller, not ", s.downscale));
-  if (s.hold_out == 1) return bad("holding out every view leaves none to train on");
+  if (s.views.points < 1) return bad("points must be at least 1: a fit starts from surface samples");
+  if (s.fit_steps < 1 || s.fit_steps > 10'000'000) return bad(Cat("steps must be 1 to 10,000,000, not ", s.fit_steps));
+  if (s.downscale < 2 || s.downscale > 64) return bad(Cat("downscale must be 2 to 64, not ", s.downscale));
+  if (s.hold_out == 1) return bad("hold_out 1 holds out every view and leaves none to train on");
   for (const float x : s.views.background) {
     if (!(x >= 0 && x <= 1)) return bad(Cat("background ", x, " is not in 0 to 1"));
   }
   if (s.init_points > 0 && s.start == FitStart::kSurface) {
-    return bad("init_points are those of init random and view; points says how many samples of the surface there are");
+    return bad("init_points works only with init random and view; points sets the number of surface samples");
   }
-  if (s.init_points > kMostInitPoints) return bad(Cat("a fit begins with at most ", kMostInitPoints, " points"));
+  if (s.init_points > kMostInitPoints) return bad(Cat("init_points must be at most ", kMostInitPoints));
   if (!(s.init_extent >= 1e-3 && s.init_extent <= 1e3)) {
     return bad(Cat("init_extent ", s.init_extent, " is not in 0.001 to 1000"));
   }
-  if (s.init_extent != kRandomExtent && s.start != FitStart::kRandom) return bad("init_extent is that of init random");
+  if (s.init_extent != kRandomExtent && s.start != FitStart::kRandom)
+    return bad("init_extent works only with init random");
   if (s.sh_degree < 0 || s.sh_degree > kMaxShDegree) return bad(Cat("sh_degree ", s.sh_degree, " is not in 0 to 3"));
   if (s.strategy == FitPreset::kMcmc && s.max_gaussians == 0) {
-    return bad("strategy mcmc grows to a bound: max_gaussians says how many");
+    return bad("strategy mcmc needs max_gaussians, the number it grows to");
   }
   if (s.mip_filter && (s.pixel_area || s.mode != RenderMode::kClassic)) {
-    return bad("mip_filter has a rendering of its own: mode and pixel cannot be changed");
+    return bad("mip_filter excludes mode and pixel: it sets both");
   }
-  if (s.from.empty() != s.after.empty()) return bad("from and after belong together");
+  if (s.from.empty() != s.after.empty()) return bad("from and after need each other");
   if (s.IsDerived() && !IsOneOf(s.after, kAfterNames)) {
-    return bad(Cat("after is one of spz, sog, splat and enhanced, not \"", Printable(s.after), "\""));
+    return bad(Cat("after must be spz, sog, splat or enhanced, not \"", Printable(s.after), "\""));
   }
   return Validate(s.defects);
 }

@@ -98,7 +98,7 @@ Status MakeEmptyFolder(const fs::path& path) {
   std::error_code code;
   fs::remove_all(path, code);
   if (!code) fs::create_directories(path, code);
-  if (code) return Error{ErrorCode::kIo, Cat(path.string(), ": cannot make this folder: ", code.message())};
+  if (code) return Error{ErrorCode::kIo, Cat(path.string(), ": cannot create this folder: ", code.message())};
   return {};
 }
 
@@ -113,11 +113,13 @@ Status CopyFile(const fs::path& from, const fs::path& to) {
 
 Status Validate(const PictureDefects& d) {
   const auto bad = [](std::string sentence) { return Error{ErrorCode::kBadArgument, std::move(sentence)}; };
-  if (!(d.noise >= 0 && d.noise <= 255)) return bad(Cat("noise is 0 to 255, not ", d.noise));
-  if (d.jpeg < 0 || d.jpeg > 100) return bad(Cat("jpeg is a quality from 1 to 100, or 0, not ", d.jpeg));
-  if (!(d.exposure >= 0 && d.exposure <= 1)) return bad(Cat("exposure is a share from 0 to 1, not ", d.exposure));
+  if (!(d.noise >= 0 && d.noise <= 255)) return bad(Cat("noise must be 0 to 255, not ", d.noise));
+  if (d.jpeg < 0 || d.jpeg > 100) return bad(Cat("jpeg must be a quality from 1 to 100, or 0 for none, not ", d.jpeg));
+  if (!(d.exposure >= 0 && d.exposure <= 1))
+    return bad(Cat("exposure must be a fraction from 0 to 1, not ", d.exposure));
   for (const auto& [name, value] : {std::pair("pose", d.pose), {"mask", d.mask}, {"defocus", d.defocus}}) {
-    if (!(value >= 0 && value <= kMostPixels)) return bad(Cat(name, " is 0 to ", kMostPixels, " pixels, not ", value));
+    if (!(value >= 0 && value <= kMostPixels))
+      return bad(Cat(name, " must be 0 to ", kMostPixels, " pixels, not ", value));
   }
   return {};
 }
@@ -199,7 +201,7 @@ Status WriteCapturedProject(const fs::path& low, const fs::path& to, const Pictu
   const auto photograph = [&](int64_t i) -> Status {
     Camera& camera = cameras.cameras[static_cast<size_t>(i)];
     if (camera.image.empty()) {
-      return Error{ErrorCode::kNotFound, Cat((low / "images").string(), ": no picture ", camera.name)};
+      return Error{ErrorCode::kNotFound, Cat((low / "images").string(), ": picture ", camera.name, " is missing")};
     }
     const bool held_out = hold_out > 0 && i % hold_out == 0;
     const fs::path source = camera.image;

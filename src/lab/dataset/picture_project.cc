@@ -72,7 +72,7 @@ constexpr uint64_t kMaxPictureBytes = uint64_t{4} << 30;
 Status MakeProjectFolder(const fs::path& folder) {
   std::error_code code;
   fs::create_directories(folder, code);
-  if (code) return Error{ErrorCode::kIo, Cat(folder.string(), ": cannot make this folder: ", code.message())};
+  if (code) return Error{ErrorCode::kIo, Cat(folder.string(), ": cannot create this folder: ", code.message())};
   return {};
 }
 
@@ -93,14 +93,14 @@ Result<ProjectCameras> MakeCameras(const fs::path& project, const std::vector<Ca
   const Pinhole low = Scaled(high, 1.0 / downscale);
   if (low.width >= high.width || low.height >= high.height || high.width < downscale || high.height < downscale) {
     return bad(
-        Cat("pictures of ", high.width, " x ", high.height, " pixels cannot be made ", downscale, " times smaller"));
+        Cat("pictures of ", high.width, " x ", high.height, " pixels are too small to downscale by ", downscale));
   }
   ProjectCameras out;
   std::map<std::string, std::string> taken;
   for (const Camera& view : views) {
     if (!SameIntrinsics(view.intrinsics, high)) {
-      return bad(
-          Cat("views ", views[0].name, " and ", view.name, " have different cameras; the layout has one for all"));
+      return bad(Cat("views ", views[0].name, " and ", view.name,
+                     " have different cameras; a data set has one for all views"));
     }
     Camera camera = view;
     camera.name = fs::path(view.name).filename().string();
@@ -131,10 +131,9 @@ Status WritePictures(const Camera& source, const fs::path& high, const fs::path&
                      const WriteOptions& write) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewPicture picture, ReadPhotograph(source));
   if (!picture.ignored.empty()) {
-    return Error{ErrorCode::kBadArgument,
-                 Cat(source.image.string(),
-                     ": a mask or a lens leaves out a part of the picture; data sets have no place "
-                     "for that")};
+    return Error{ErrorCode::kBadArgument, Cat(source.image.string(),
+                                              ": a mask or lens leaves pixels undefined, which a data set cannot "
+                                              "store")};
   }
   const Image& image = picture.image;
   if (source.image.extension() == ".png" && source.photograph.lens.IsIdentity() && source.photograph.orientation == 1) {
@@ -207,7 +206,7 @@ Result<PictureProjectReport> WritePictureProject(const fs::path& project, const 
     {
       const std::lock_guard<std::mutex> lock(mutex);
       if (failed.ok() && StopRequested()) {
-        failed = Error{ErrorCode::kInterrupted, Cat(folder.string(), ": stopped while the views were made")};
+        failed = Error{ErrorCode::kInterrupted, Cat(folder.string(), ": stopped while making the views")};
       }
       if (!failed.ok()) return;
     }

@@ -199,7 +199,7 @@ Status TakeSettings(const std::string& file, const toml::table& table, const std
     if (others.count(name) > 0) continue;
     const auto known = Keys().find(name);
     const Item item{file, std::string(name), node};
-    if (known == Keys().end()) return item.Complain("is not a setting of a recipe");
+    if (known == Keys().end()) return item.Complain("is not a recipe setting");
     ANCHORSPLAT_RETURN_IF_ERROR(known->second(item, settings));
   }
   return {};
@@ -227,17 +227,19 @@ Result<RecipeEntry> TakeEntry(const std::string& file, const toml::table& table,
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string base, (Item{file, "from", *from}.Text()));
     const auto found =
         std::find_if(earlier.begin(), earlier.end(), [&](const RecipeEntry& other) { return other.name == base; });
-    if (found == earlier.end()) return complain(Cat("from: there is no entry \"", Printable(base), "\" above"));
-    if (found->settings.IsDerived()) return complain(Cat("from: \"", base, "\" has no fit of its own"));
+    if (found == earlier.end()) return complain(Cat("from: no earlier entry is called \"", Printable(base), "\""));
+    if (found->settings.IsDerived())
+      return complain(Cat("from: \"", base, "\" is itself derived; name the entry it comes from"));
     settings = found->settings;
     settings.from = base;
     entry.objects = found->objects;
     for (const auto& [key, node] : table) {
       if (kDerivedKeys.contains(key.str())) continue;
-      return Item{file, std::string(key.str()), node}.Complain("with from, all settings are those of that entry");
+      return Item{file, std::string(key.str()), node}.Complain(
+          "cannot be set with from, which takes all settings of that entry");
     }
     const toml::node* after = table.get("after");
-    if (after == nullptr) return complain("from needs after, which says what becomes of the splat");
+    if (after == nullptr) return complain("from needs after, which says what to do with the splat");
     ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t how, ChooseName(Item{file, "after", *after}, kAfterNames));
     settings.after = kAfterNames[how];
     entry.name = Cat(base, "-", settings.after);
@@ -250,16 +252,16 @@ Result<RecipeEntry> TakeEntry(const std::string& file, const toml::table& table,
   if (const toml::node* node = table.get("name")) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(entry.name, (Item{file, "name", *node}.Text()));
   }
-  if (!IsEntryName(entry.name)) return complain("a name has letters, digits, '.', '_' and '-', 40 at most");
+  if (!IsEntryName(entry.name)) return complain("name must have 1 to 40 letters, digits, '.', '_' and '-'");
   if (const toml::node* node = table.get("weight")) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(entry.weight, (Item{file, "weight", *node}.Number()));
-    if (!(entry.weight > 0)) return complain("weight is not positive");
+    if (!(entry.weight > 0)) return complain("weight must be positive");
   }
   if (const toml::node* node = table.get("objects")) {
     const Item item{file, "objects", *node};
     ANCHORSPLAT_ASSIGN_OR_RETURN(const int64_t objects, item.Whole(1, INT64_MAX));
     if (entry.objects > 0 && objects > entry.objects) {
-      return item.Complain(Cat("only ", entry.objects, " have the entry that it is made from"));
+      return item.Complain(Cat("only ", entry.objects, " objects have the entry it is made from"));
     }
     entry.objects = objects;
   }
@@ -278,7 +280,7 @@ Status TakeDraws(const Item& item, Recipe& recipe) {
   if (draws > std::ssize(recipe.entries)) {
     return item.Complain(Cat("an object cannot be drawn ", draws, " times: the recipe has ", recipe.entries.size(),
                              recipe.entries.size() == 1 ? " entry" : " entries",
-                             " ([[mix]]), and each is drawn once at most"));
+                             " ([[mix]]), each drawn at most once"));
   }
   recipe.draws = static_cast<int>(draws);
   return {};
@@ -302,7 +304,7 @@ Result<Recipe> RecipeFrom(const std::string& file, const toml::table& root, Obje
       ANCHORSPLAT_ASSIGN_OR_RETURN(RecipeEntry entry, TakeEntry(file, *table, settings, recipe.entries));
       for (const RecipeEntry& other : recipe.entries) {
         if (other.name == entry.name)
-          return Item{file, "mix", node}.Complain(Cat("\"", entry.name, "\" is there twice"));
+          return Item{file, "mix", node}.Complain(Cat("\"", entry.name, "\" is listed twice"));
       }
       recipe.entries.push_back(std::move(entry));
     }
@@ -320,7 +322,7 @@ Result<Recipe> RecipeFrom(const std::string& file, const toml::table& root, Obje
                                        [](const RecipeEntry& entry) { return entry.settings.IsDerived(); })) {
     return Error{ErrorCode::kBadFile, Cat(file,
                                           ": entries with from need draws = \"all\", so that every object has "
-                                          "what they are made from")};
+                                          "the entry they are made from")};
   }
   return recipe;
 }
@@ -339,8 +341,7 @@ Result<Recipe> ReadRecipe(const std::filesystem::path& path, const ObjectSetting
   try {
     const toml::table root = toml::parse(text);
     if (root.empty()) {
-      return Error{ErrorCode::kBadFile,
-                   Cat(path.string(), ": sets nothing; without a recipe the options' defaults count")};
+      return Error{ErrorCode::kBadFile, Cat(path.string(), ": sets nothing; omit --recipe to use the defaults")};
     }
     return RecipeFrom(path.string(), root, defaults);
   } catch (const toml::parse_error& error) {

@@ -172,13 +172,13 @@ TEST(Recipe, WhatIsMadeFromAnotherNeedsIt) {
     return complaint(entries).find(about) != std::string::npos;
   };
   EXPECT_EQ(complaint("from = \"a\"\nafter = \"splat\""), "");
-  EXPECT_TRUE(says("from = \"b\"\nafter = \"spz\"", "no entry \"b\""));
+  EXPECT_TRUE(says("from = \"b\"\nafter = \"spz\"", "no earlier entry is called \"b\""));
   EXPECT_TRUE(says("from = \"a\"", "needs after"));
   EXPECT_TRUE(says("after = \"spz\"", "needs from"));
   EXPECT_TRUE(says("from = \"a\"\nafter = \"zip\"", "known are spz, sog, splat and enhanced"));
-  EXPECT_TRUE(says("from = \"a\"\nafter = \"spz\"\nsteps = 3", "settings are those of that entry"));
+  EXPECT_TRUE(says("from = \"a\"\nafter = \"spz\"\nsteps = 3", "takes all settings of that entry"));
   EXPECT_TRUE(says("from = \"a\"\nafter = \"spz\"\nobjects = 3", "only 2 have"));
-  EXPECT_TRUE(says("from = \"a\"\nafter = \"spz\"\n[[mix]]\nfrom = \"a-spz\"\nafter = \"sog\"", "no fit of its own"));
+  EXPECT_TRUE(says("from = \"a\"\nafter = \"spz\"\n[[mix]]\nfrom = \"a-spz\"\nafter = \"sog\"", "is itself derived"));
   EXPECT_FALSE(Read("[[mix]]\nname = \"a\"\n[[mix]]\nfrom = \"a\"\nafter = \"spz\"").ok());  // one of them is drawn
   EXPECT_FALSE(Read("draws = \"some\"\n[[mix]]").ok());
 }

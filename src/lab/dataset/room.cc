@@ -122,7 +122,8 @@ Status Place(const PlacedMesh& piece, Room& room) {
   DropInvisibleTriangles(mesh);
   const Room::Box own = BoxOf(mesh);
   if (!(own.high[1] > own.low[1])) {
-    return Error{ErrorCode::kBadArgument, Cat(piece.mesh, ": has no height that could be made ", piece.height, " m")};
+    return Error{ErrorCode::kBadArgument,
+                 Cat(piece.mesh, ": has no height, so it cannot be scaled to ", piece.height, " m")};
   }
   const double scale = piece.height / (double{own.high[1]} - own.low[1]);
   const double angle = piece.turn * std::numbers::pi / 180, cosine = std::cos(angle), sine = std::sin(angle);
@@ -138,7 +139,7 @@ Status Place(const PlacedMesh& piece, Room& room) {
   for (size_t k = 0; k < 3; ++k) {
     if (box.low[k] < -1e-3f || box.high[k] > static_cast<float>(room.size[k]) + 1e-3f) {
       return Error{ErrorCode::kBadArgument, Cat(piece.mesh, ": reaches from ", box.low[k], " to ", box.high[k],
-                                                " m along ", "xyz"[k], ", the room from 0 to ", room.size[k])};
+                                                " m along ", "xyz"[k], ", but the room from 0 to ", room.size[k])};
     }
   }
   room.furniture.push_back(box);
@@ -302,7 +303,7 @@ Result<Room> FurnishRoom(const std::vector<PlacedMesh>& furniture, const RoomOpt
   const auto& size = options.size;
   if (!(size[0] >= 4.5 && size[1] >= 2.5 && size[2] >= 4 && size[0] < 20 && size[1] < 20 && size[2] < 20)) {
     return Error{ErrorCode::kBadArgument,
-                 Cat("a room is 4.5 x 2.5 x 4 to 20 x 20 x 20 m large, not ", size[0], " x ", size[1], " x ", size[2])};
+                 Cat("a room must be 4.5 x 2.5 x 4 to 20 x 20 x 20 m, not ", size[0], " x ", size[1], " x ", size[2])};
   }
   Room room;
   room.size = size;
@@ -324,14 +325,14 @@ Result<Room> FurnishRoom(const std::vector<PlacedMesh>& furniture, const RoomOpt
 
 Result<ViewSetCameras> RoomCameras(const Room& room, int count, int low, int high) {
   if (count < 1 || count > 10'000 || low < 4 || high < 4 || low % 4 != 0 || high % 4 != 0) {
-    return Error{ErrorCode::kBadArgument, Cat("1 to 10,000 views whose width is a multiple of 4 are possible, not ",
+    return Error{ErrorCode::kBadArgument, Cat("expected 1 to 10,000 views, with widths that are multiples of 4, not ",
                                               count, " of ", low, " and ", high, " pixels")};
   }
   ViewSetCameras cameras;
   const int digits = count > 1000 ? 4 : 3;
   const int most = 100 * count + 1000;  // attempts
   for (int index = 1, made = 0; made < count; ++index) {
-    if (index > most) return Error{ErrorCode::kBadArgument, "the room has no free place for cameras"};
+    if (index > most) return Error{ErrorCode::kBadArgument, "the room has no free space for cameras"};
     std::array<double, 3> eye;
     for (size_t k = 0; k < 3; ++k) {
       const double from = k == 1 ? 0.6 : kFromWalls, to = k == 1 ? 2.1 : room.size[k] - kFromWalls;

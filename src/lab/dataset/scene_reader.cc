@@ -87,7 +87,7 @@ Result<Image> ReadView(const Camera& camera) {
 }  // namespace
 
 Result<std::vector<SceneEntry>> ListScenes(const fs::path& dataset, const SceneListOptions& options) {
-  if (!IsFolder(dataset)) return NotFound(Cat(dataset.string(), ": there is no such folder"));
+  if (!IsFolder(dataset)) return NotFound(Cat(dataset.string(), ": no such folder"));
   std::vector<SceneEntry> scenes;
   if (IsFile(dataset / kManifestName)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Manifest manifest, ReadManifest(dataset));
@@ -140,7 +140,7 @@ Result<Scene> Scene::Open(const SceneEntry& entry) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ColmapCameras intrinsics, ReadColmapCamerasText(high / "cameras.txt"));
   if (intrinsics.size() != 1) {
     return Error{ErrorCode::kBadFile,
-                 Cat((high / "cameras.txt").string(), ": ", intrinsics.size(), " cameras; the layout has exactly one")};
+                 Cat((high / "cameras.txt").string(), ": ", intrinsics.size(), " cameras; expected exactly one")};
   }
   const std::vector<fs::path> pictures = {high / "images"};
   for (const Camera& camera : cameras.cameras) {
@@ -160,8 +160,9 @@ Result<Scene> Scene::Open(const SceneEntry& entry) {
 Status Scene::ResizeHighViews(int size) {
   const bool stored = std::ranges::any_of(high_views_, [](const Camera& view) { return !view.image.empty(); });
   if (!record_ || stored || !IsFile(folder_ / kMeshName)) {
-    return Error{ErrorCode::kBadArgument, Cat(folder_.string(), ": has no views of another size, as its pictures are ",
-                                              "stored and not made on demand (dataset build --hr on-demand)")};
+    return Error{ErrorCode::kBadArgument,
+                 Cat(folder_.string(), ": has no views of another size, because its pictures are ",
+                     "stored, not rendered on demand (dataset build --hr on-demand)")};
   }
   for (Camera& view : high_views_) {
     view.intrinsics = Scaled(view.intrinsics, static_cast<double>(size) / view.intrinsics.width);
@@ -188,8 +189,7 @@ Result<fs::path> Scene::LowSplatPath() const {
     most = *step;
     last = entry;
   }
-  if (most < 0)
-    return NotFound(Cat(folder.string(), ": there is no ckpt_*_rank0.pt: the low-quality splat is missing"));
+  if (most < 0) return NotFound(Cat(folder.string(), ": the low-quality splat (ckpt_*_rank0.pt) is missing"));
   return last;
 }
 
@@ -200,7 +200,8 @@ Result<GaussianCloud> Scene::LowSplat() const {
 
 Result<Image> Scene::LowPicture(size_t view) const {
   const Camera& camera = low_views_.at(view);
-  if (camera.image.empty()) return NotFound(Cat((low_folder_ / "images").string(), ": no picture ", camera.name));
+  if (camera.image.empty())
+    return NotFound(Cat((low_folder_ / "images").string(), ": picture ", camera.name, " is missing"));
   return ReadView(camera);
 }
 
@@ -212,8 +213,8 @@ Result<Image> Scene::HighPicture(size_t view) const {
 Result<Image> Scene::Rendered(size_t view) const {
   const fs::path path = folder_ / kMeshName;
   if (!record_ || !IsFile(path)) {
-    return NotFound(Cat(folder_.string(), ": no high-resolution picture ", high_views_[view].name, " and no ",
-                        kMeshName, " to make it from"));
+    return NotFound(Cat(folder_.string(), ": neither the high-resolution picture ", high_views_[view].name, " nor ",
+                        kMeshName, " to render it from"));
   }
   {
     const std::lock_guard<std::mutex> lock(renderer_->mutex);
@@ -229,7 +230,7 @@ Result<Image> Scene::Rendered(size_t view) const {
       return RenderStoredView(*renderer_->tracer, camera, record_->settings.views);
     }
   }
-  return NotFound(Cat(folder_.string(), ": its record knows no view ", high_views_[view].name));
+  return NotFound(Cat(folder_.string(), ": its record has no view ", high_views_[view].name));
 }
 
 }  // namespace anchorsplat

@@ -54,8 +54,8 @@ Result<fs::path> OnlySplat(const fs::path& folder) {
   if (found.size() == 1) return found[0];
   const auto input = std::find_if(found.begin(), found.end(), [](const fs::path& p) { return p.stem() == "input"; });
   if (input != found.end()) return *input;
-  return NotFound(
-      Cat(folder.string(), found.empty() ? ": there is no splat" : ": there are several splats, none input.*"));
+  return NotFound(Cat(folder.string(), found.empty() ? ": contains no splat"
+                                                     : ": contains several splats, none of them called input.*"));
 }
 
 Status ReadScene(const BenchmarkEntry& entry, BenchmarkObject& object) {

@@ -48,7 +48,7 @@ Result<BicubicFit> FitEnlargedPictures(const MethodTask& task, int64_t steps) {
   const auto start = [&]() -> Result<FitTask> {
     std::error_code code;
     fs::create_directories(pictures, code);
-    if (code) return Error{ErrorCode::kIo, Cat(pictures.string(), ": cannot make this folder: ", code.message())};
+    if (code) return Error{ErrorCode::kIo, Cat(pictures.string(), ": cannot create this folder: ", code.message())};
     for (size_t i = 0; i < views.train.size(); ++i) {
       Camera& camera = views.train[i];
       // In captures every picture has its own camera.

@@ -162,7 +162,7 @@ Status MeasureAndKeep(const MethodTask& task, const std::string& place, const fs
   }
   // Keeps known results even if a view's truth turns out to be broken.
   for (Pending& p : pending) {
-    if (!p.failure && measured.ok() && p.result.views.empty()) p.failure = "the masks leave nothing of any view";
+    if (!p.failure && measured.ok() && p.result.views.empty()) p.failure = "the masks hide every pixel of all views";
     if (p.failure) {
       evaluation.failures.push_back({task.object.name, p.method->name, *p.failure});
     } else if (measured.ok()) {
@@ -184,7 +184,8 @@ Status EvaluateObject(const BenchmarkEntry& entry, const std::string& place, con
   const std::vector<size_t> views =
       SubsampleEvenly(options.protocol == Protocol::kUpstream ? UpstreamViews(object.views.size()) : object.held_out,
                       options.max_views);
-  if (views.empty()) return Error{ErrorCode::kBadFile, "every high-resolution view was trained on: none is held out"};
+  if (views.empty())
+    return Error{ErrorCode::kBadFile, "no high-resolution view is held out: the fit was trained on all"};
   std::error_code code;
   fs::create_directories(folder, code);
   if (code) return Error{ErrorCode::kIo, Cat(folder.string(), ": ", code.message())};
@@ -227,7 +228,7 @@ Status CheckMethods(const std::vector<EvalMethod>& methods) {
   for (const EvalMethod& method : methods) {
     if (!names.insert(FileStem(method.name)).second) {
       return Error{ErrorCode::kBadArgument,
-                   Cat("--methods: two of them would be called ", method.name, "; rename the file of one")};
+                   Cat("--methods: two methods would be called ", method.name, "; rename the file of one")};
     }
   }
   if (methods.empty()) return Error{ErrorCode::kBadArgument, "no methods to evaluate"};
@@ -244,7 +245,7 @@ Result<std::vector<BenchmarkEntry>> ChooseKinds(std::vector<BenchmarkEntry> entr
     std::string list;
     for (const std::string& word : known) list += Cat(list.empty() || word.empty() ? "" : ", ", word);
     return Error{ErrorCode::kBadArgument, Cat("--kinds: no object is of kind '", Printable(kind), "'",
-                                              list.empty() ? "" : "; there are ", Printable(list))};
+                                              list.empty() ? "" : "; known: ", Printable(list))};
   }
   std::erase_if(entries, [&](const BenchmarkEntry& entry) {
     return std::find(kinds.begin(), kinds.end(), entry.kind) == kinds.end();
@@ -272,8 +273,8 @@ Result<std::vector<BenchmarkEntry>> ChooseObjects(std::vector<BenchmarkEntry> en
             ? Cat("--objects: there is no object '", Printable(name), "'",
                   options.split.empty() ? "" : Cat(" in the split ", Printable(options.split)))
             : Cat("--objects: '", Printable(name), "' is of ",
-                  left_out->kind.empty() ? "no kind that is known" : Cat("the kind '", Printable(left_out->kind), "'"),
-                  ", which --kinds leaves out; give one of the two options, or a kind of all these objects")};
+                  left_out->kind.empty() ? "an unknown kind" : Cat("the kind '", Printable(left_out->kind), "'"),
+                  ", which --kinds excludes; pass only one of the two options, or add that kind")};
   }
   return chosen;
 }
@@ -319,7 +320,7 @@ Result<Evaluation> Evaluate(const fs::path& benchmark, const std::vector<EvalMet
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<BenchmarkEntry> entries, ChooseEntries(benchmark, options));
   std::error_code code;
   fs::create_directories(out / "objects", code);
-  if (code) return Error{ErrorCode::kIo, Cat(out.string(), ": cannot make this folder: ", code.message())};
+  if (code) return Error{ErrorCode::kIo, Cat(out.string(), ": cannot create this folder: ", code.message())};
 
   Evaluation evaluation;
   evaluation.protocol = options.protocol;

@@ -291,13 +291,13 @@ TEST(EvalMethods, RefinementTakesOptions) {
   EXPECT_THAT(error("refine@speed=1"), HasSubstr("ssim-weight"));
   EXPECT_THAT(error("refine@k=x"), HasSubstr("k cannot be 'x'"));
   EXPECT_THAT(error("refine@k=0"), HasSubstr("K must be"));
-  EXPECT_THAT(error("refine@f=-1"), HasSubstr("f is a number"));
+  EXPECT_THAT(error("refine@f=-1"), HasSubstr("f must be a number"));
   EXPECT_THAT(error("refine@k=1@k=2"), HasSubstr("each once"));
   EXPECT_THAT(error("refine@"), HasSubstr("KEY=VALUE"));
   EXPECT_THAT(error("refine-images@hold-out=0"), HasSubstr("benchmark"));
-  EXPECT_THAT(error("filter+raw@k=1"), HasSubstr("none of raw"));
-  EXPECT_THAT(error("refine-images-auto"), HasSubstr("nothing is read off the splat"));
-  EXPECT_THAT(error("raw-auto"), HasSubstr("none of raw"));
+  EXPECT_THAT(error("filter+raw@k=1"), HasSubstr("is not raw"));
+  EXPECT_THAT(error("refine-images-auto"), HasSubstr("-auto has no effect"));
+  EXPECT_THAT(error("raw-auto"), HasSubstr("is not raw"));
 }
 
 // What was kept counts for the truth, the pictures and the cameras that it was measured with.

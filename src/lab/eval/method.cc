@@ -113,7 +113,7 @@ EvalMethod Bicubic(int64_t steps) {
 Result<std::string> Identity(const fs::path& path) {
   std::error_code code;
   const auto size = fs::file_size(path, code);
-  if (code) return Error{ErrorCode::kNotFound, Cat(path.string(), ": there is no such file")};
+  if (code) return Error{ErrorCode::kNotFound, Cat(path.string(), ": no such file")};
   return Cat(path.string(), " ", size, " ", fs::last_write_time(path, code).time_since_epoch().count());
 }
 
@@ -125,8 +125,8 @@ Result<EvalMethod> Upscaled(const fs::path& file) {
   return Enlarged(file.stem().string(), identity, [upscaler](const Image& low, const Pinhole& high) -> Result<Image> {
     const int factor = high.width / low.width;
     if (factor * low.width != high.width || factor * low.height != high.height) {
-      return Error{ErrorCode::kBadArgument, Cat("an upscaler makes whole pixels of each: ", low.width, " x ",
-                                                low.height, " do not become ", high.width, " x ", high.height)};
+      return Error{ErrorCode::kBadArgument, Cat("an upscaler needs a whole factor: ", low.width, " x ", low.height,
+                                                " cannot become ", high.width, " x ", high.height)};
     }
     return EnlargePicture(*upscaler, low, {.factor = factor});
   });
@@ -235,7 +235,7 @@ Result<double> ParseStrength(const std::string& word, std::string_view value) {
   const auto [stop, code] = std::from_chars(value.data(), end, f);
   if (code == std::errc() && stop == end && f >= 0 && f <= kMaxFilterStrength) return f;
   return Error{ErrorCode::kBadArgument,
-               Cat("--methods ", Printable(word), ": f is a number from 0 to ", kMaxFilterStrength)};
+               Cat("--methods ", Printable(word), ": f must be a number from 0 to ", kMaxFilterStrength)};
 }
 
 // Parses a setting of the choice among copies: a cost, or an integer of at least 1.
@@ -247,18 +247,18 @@ Result<double> ParseCount(const std::string& word, std::string_view key, std::st
   if (code == std::errc() && stop == end && (key == "merge-cost" ? number >= 0 && std::isfinite(number) : whole)) {
     return number;
   }
-  return Error{ErrorCode::kBadArgument, Cat("--methods ", Printable(word), ": ", key, " is a ",
+  return Error{ErrorCode::kBadArgument, Cat("--methods ", Printable(word), ": ", key, " must be a ",
                                             key == "merge-cost" ? "number of 0 or more" : "whole number of 1 or more")};
 }
 
 Status SetOption(NamedMethod& method, std::string_view key, std::string_view value) {
   if (key == "hold-out") {
-    return Error{ErrorCode::kBadArgument,
-                 Cat("--methods ", Printable(method.word), ": which views are held out is the benchmark's to say")};
+    return Error{ErrorCode::kBadArgument, Cat("--methods ", Printable(method.word),
+                                              ": hold-out cannot be set, as the benchmark chooses the held-out views")};
   }
   if (key == "downscale") {
-    return Error{ErrorCode::kBadArgument,
-                 Cat("--methods ", Printable(method.word), ": how large pictures are is the benchmark's to say")};
+    return Error{ErrorCode::kBadArgument, Cat("--methods ", Printable(method.word),
+                                              ": downscale cannot be set, as the benchmark sets the picture size")};
   }
   if (key == "copies" && value == "auto") return {};
   if (key == "copies" || key == "max-gaussians" || key == "merge-cost") {
@@ -279,7 +279,7 @@ Status SetOption(NamedMethod& method, std::string_view key, std::string_view val
     const Status set = SetRefineOption(method.refine, key, value);
     if (set.ok()) return set;
     return Error{ErrorCode::kBadArgument, Cat("--methods ", Printable(method.word), ": ", set.error().message,
-                                              "; f is that of the filter, copies and merge-cost are the network's")};
+                                              "; f is for the filter, copies and merge-cost are for networks")};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(method.filter_strength, ParseStrength(method.word, value));
   return {};
@@ -322,7 +322,7 @@ Result<std::optional<NamedMethod>> ParseNamed(const std::string& word, const std
   if (method.auto_pixel_size && method.name.ends_with("refine-images")) {
     return Error{ErrorCode::kBadArgument,
                  Cat("--methods ", Printable(word),
-                     ": the pictures' cameras say the pixel size, nothing is read off the splat")};
+                     ": -auto has no effect, as the cameras of the pictures give the pixel size")};
   }
   if (word.size() > name_end && method.name == "filter") {
     return Error{ErrorCode::kBadArgument,
@@ -337,7 +337,7 @@ Result<std::optional<NamedMethod>> ParseNamed(const std::string& word, const std
     if (key == "most-gaussians") key = "max-gaussians";  // former name
     if (equals == std::string::npos || !keys.insert(key).second) {
       return Error{ErrorCode::kBadArgument,
-                   Cat("--methods ", Printable(word), ": options are written @KEY=VALUE, each once; of f, ",
+                   Cat("--methods ", Printable(word), ": options must be @KEY=VALUE, each once; known: f, ",
                        RefineOptionKeys())};
     }
     ANCHORSPLAT_RETURN_IF_ERROR(SetOption(method, key, option.substr(equals + 1)));
@@ -473,7 +473,7 @@ Result<EvalMethod> MakeEvalMethod(const std::string& word, const MethodOptions& 
   if (extension == ".safetensors" && IsUpscaler(word)) return Upscaled(word);
   if (extension == ".safetensors" || extension == ".pth" || extension == ".pt") return Model(word);
   return Error{ErrorCode::kBadArgument, Cat("--methods: '", Printable(word),
-                                            "' is none of raw, filter, filter@F, filter-auto, filter-best, upsample, "
+                                            "' is not raw, filter, filter@F, filter-auto, filter-best, upsample, "
                                             "bicubic, a network's file, auto, fast, good, best or "
                                             "a method of enhance, NAME or NAME-auto")};
 }

@@ -96,37 +96,37 @@ Result<ReadingTask> ReadingTaskFrom(const nlohmann::json& json) {
       } else if (name == "id") {
         task.id = value.get<std::string>();
       } else if (name == "downscale") {
-        if (!value.is_number_integer()) return bad("downscale is no whole number");
+        if (!value.is_number_integer()) return bad("downscale must be a whole number");
         task.downscale = value.get<int>();
         if (task.downscale < 1 || task.downscale > kMaxDownscale) {
-          return bad(Cat("downscale is not from 1 to ", kMaxDownscale));
+          return bad(Cat("downscale must be 1 to ", kMaxDownscale));
         }
       } else if (name == "measure") {
         task.measure = value.get<bool>();
       } else if (name == "places") {
         if (!value.is_number_unsigned() || value.get<uint64_t>() > kMostPlacesOfRow) {
-          return bad(Cat("places: no whole number from 0 to ", kMostPlacesOfRow));
+          return bad(Cat("places must be a whole number from 0 to ", kMostPlacesOfRow));
         }
         task.places = value.get<int>();
       } else if (name == "others") {
         if (value.size() != 2 || !value.at("from").is_number_integer())
-          return bad("others are a whole from and a pixel");
+          return bad("others must have a whole number \"from\" and a number \"pixel\"");
         task.others_from = value.at("from").get<int64_t>();
         task.others_pixel = value.at("pixel").get<double>();
-        if (task.others_from < 1 || !(task.others_pixel > 0)) return bad("others: no rows or no pixel");
+        if (task.others_from < 1 || !(task.others_pixel > 0)) return bad("others: from and pixel must be positive");
       } else if (name == "keep") {
         const auto corners = value.get<std::vector<double>>();
         task.keep = RegionOf(corners);
         if (!task.keep) return bad("keep" + std::string(kNoRegion));
       } else if (name == "moved") {
         if (value.size() != 3 || value.at("rotation").size() != 9 || value.at("translation").size() != 3) {
-          return bad("moved: a scale, a rotation of nine numbers and a translation of three");
+          return bad("moved must have a scale, a rotation of nine numbers and a translation of three");
         }
         task.moved.scale = value.at("scale").get<double>();
         task.moved.rotation = value.at("rotation").get<std::array<double, 9>>();
         task.moved.translation = value.at("translation").get<std::array<double, 3>>();
-        if (!(task.moved.scale > 0)) return bad("moved: the scale is not positive");
-        if (!IsRotation(task.moved.rotation)) return bad("moved: that is no rotation");
+        if (!(task.moved.scale > 0)) return bad("moved: the scale must be positive");
+        if (!IsRotation(task.moved.rotation)) return bad("moved: not a rotation");
       } else {
         fs::path* const path = name == "splat"     ? &task.splat
                                : name == "object"  ? &task.object
@@ -140,15 +140,15 @@ Result<ReadingTask> ReadingTaskFrom(const nlohmann::json& json) {
   } catch (const nlohmann::json::exception&) {
     return bad("a property is missing or has a value of another type");
   }
-  if (task.id.empty() || task.splat.empty()) return bad("it needs an id and a splat");
+  if (task.id.empty() || task.splat.empty()) return bad("id or splat is missing");
   const bool is_about_gains = task.keep || !task.context.empty() || task.others_from > 0 || !task.model.empty();
   if (task.object.empty() && (is_about_gains || task.places > 0)) {
-    return bad("keep, context, others, model and places are about gains or pixels, which need an object");
+    return bad("keep, context, others, model and places need an object");
   }
-  if (!task.measure && !task.model.empty()) return bad("what a model decides is measured, and measure is false");
+  if (!task.measure && !task.model.empty()) return bad("model needs measure, which is false");
   if (task.id.size() > kMostOfName || task.id.front() == '.' || task.id.find('/') != std::string::npos ||
       Printable(task.id, kMostOfName) != task.id) {
-    return bad(Cat(Printable(task.id), ": an id is the name of a file, of ", kMostOfName, " bytes at most"));
+    return bad(Cat(Printable(task.id), ": an id must be a file name of at most ", kMostOfName, " bytes"));
   }
   return task;
 }
@@ -159,7 +159,7 @@ Result<std::vector<ReadingTask>> ReadReadingTasks(const fs::path& path) {
   ANCHORSPLAT_RETURN_IF_ERROR(ForEachJsonLine(path, [&](const nlohmann::json& json, int64_t) -> std::string {
     Result<ReadingTask> task = ReadingTaskFrom(json);
     if (!task.ok()) return task.error().message;
-    if (!ids.insert(task->id).second) return Cat(task->id, " is there twice");
+    if (!ids.insert(task->id).second) return Cat(task->id, " is listed twice");
     tasks.push_back(*std::move(task));
     return "";
   }));
@@ -255,7 +255,7 @@ struct Measuring {
       for (int64_t i = 0; i < cloud.size(); ++i) {
         if (keep->Contains(cloud.means.data() + 3 * i)) rows.push_back(i);
       }
-      if (rows.empty()) return Error{ErrorCode::kBadFile, "no Gaussian lies in the region that is kept"};
+      if (rows.empty()) return Error{ErrorCode::kBadFile, "no Gaussian lies in the region to keep"};
       ANCHORSPLAT_ASSIGN_OR_RETURN(cloud, Subset(cloud, rows));
     }
     if (!context.empty()) ANCHORSPLAT_RETURN_IF_ERROR(Append(cloud, context));
@@ -422,7 +422,7 @@ Result<nlohmann::json> ReadingRows::Make(const ReadingTask& task) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(Buffer<float> pixels, TruePixels(cloud, low));
   if (task.others_from > 0) {
     if (task.others_from >= cloud.size()) {
-      return Error{ErrorCode::kBadFile, Cat("others begin behind the last of ", cloud.size(), " Gaussians")};
+      return Error{ErrorCode::kBadFile, Cat("others start beyond the last of ", cloud.size(), " Gaussians")};
     }
     std::fill(pixels.begin() + task.others_from, pixels.end(), static_cast<float>(task.others_pixel));
   }

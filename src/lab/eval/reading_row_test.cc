@@ -192,7 +192,7 @@ TEST_F(ReadingRowMaking, BadTasksAreRefused) {
   };
   EXPECT_EQ(refused(R"({"id":"a","splat":"a.ply","object":"o","kind":"k","keep":[0,0,0,1,1,1]})"), "");
   EXPECT_THAT(refused(R"({"id":"a","splat":"a.ply","keep":[0,0,0,1,1,1]})"), HasSubstr("need an object"));
-  EXPECT_THAT(refused(R"({"id":"a\nb","splat":"a.ply"})"), HasSubstr("an id is the name of a file"));
+  EXPECT_THAT(refused(R"({"id":"a\nb","splat":"a.ply"})"), HasSubstr("an id must be a file name"));
   EXPECT_THAT(refused(R"({"id":"a","splat":"a.ply","downscale":1.5})"), HasSubstr("whole number"));
   EXPECT_THAT(
       refused(
@@ -203,7 +203,7 @@ TEST_F(ReadingRowMaking, BadTasksAreRefused) {
   EXPECT_EQ(refused(R"({"id":"a","splat":"a","object":"o","model":"m"})"), "");
   EXPECT_THAT(refused(R"({"id":"a","splat":"a","model":"m"})"), HasSubstr("need an object"));
   EXPECT_THAT(refused(R"({"id":"a","splat":"a","object":"o","model":"m","measure":false})"),
-              HasSubstr("measure is false"));
+              HasSubstr("model needs measure"));
   EXPECT_EQ(refused(R"({"id":"a","splat":"a","object":"o","places":3})"), "");
   EXPECT_THAT(refused(R"({"id":"a","splat":"a","places":3})"), HasSubstr("need an object"));
   EXPECT_THAT(refused(R"({"id":"a","splat":"a","object":"o","places":1.5})"), HasSubstr("whole number"));
@@ -218,7 +218,7 @@ TEST_F(ReadingRowMaking, BadTasksAreRefused) {
       HasSubstr("scale"));
   for (const char* id : {"../a", "..", ".a"}) {
     EXPECT_THAT(refused(Cat(R"({"id":")", id, R"(","splat":"a.ply"})").c_str()),
-                HasSubstr("an id is the name of a file"));
+                HasSubstr("an id must be a file name"));
   }
   EXPECT_THAT(refused(R"({"id":"a","splat":"a","downscale":0})"), HasSubstr("downscale"));
   EXPECT_THAT(
@@ -229,7 +229,7 @@ TEST_F(ReadingRowMaking, BadTasksAreRefused) {
   task.others_from = 1'000'000;
   task.others_pixel = 1;
   ReadingRows rows(1);
-  EXPECT_THAT(rows.Make(task).error().message, HasSubstr("others begin behind"));
+  EXPECT_THAT(rows.Make(task).error().message, HasSubstr("others start beyond"));
   ReadingTask elsewhere = Task(Sparse());
   elsewhere.keep = Region{{5, 5, 5}, {6, 6, 6}, {}};
   EXPECT_THAT(rows.Make(elsewhere).error().message, HasSubstr("no Gaussian lies in the region"));

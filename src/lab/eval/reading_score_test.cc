@@ -76,7 +76,8 @@ TEST(ReadingTable, ErrorsNameTheLine) {
   EXPECT_THAT(ReadReadingTable(Write(folder, "{\"table\":\"others\"}\n{}\n")).error().message, HasSubstr("line 1"));
   EXPECT_THAT(ReadReadingTable(Write(folder, "[]\n")).error().message, HasSubstr("line 1"));
   EXPECT_THAT(Read(R"({"id":"a","list":{"method":"none"},"gains":"x"})").error().message, HasSubstr("line 2"));
-  EXPECT_THAT(Read(R"({"id":"a","unit":1,"features":[1]})").error().message, HasSubstr("line 2: not as many features"));
+  EXPECT_THAT(Read(R"({"id":"a","unit":1,"features":[1]})").error().message,
+              HasSubstr("line 2: has another number of features"));
   EXPECT_EQ(ReadReadingTable(folder / "none").error().code, ErrorCode::kNotFound);
 }
 
@@ -100,19 +101,19 @@ TEST(ReadingTable, DecisionsAreReadAndRefused) {
   EXPECT_EQ(refused(R"({"id":"a","method":"none"})"), "");
   EXPECT_THAT(refused(R"({"id":"a","method":"model"})"), HasSubstr("line 1: method 'model'"));
   EXPECT_THAT(refused(R"({"id":"a","method":"none","mode":"m"})"), HasSubstr("mode 'm'"));
-  EXPECT_THAT(refused(R"({"id":"z","method":"none"})"), HasSubstr("no row is called z"));
+  EXPECT_THAT(refused(R"({"id":"z","method":"none"})"), HasSubstr("unknown row z"));
   EXPECT_THAT(refused(R"({"id":"a","method":"filter"})"), HasSubstr("needs a pixel"));
   EXPECT_THAT(refused(R"({"id":"a","method":"filter","pixel":-1})"), HasSubstr("needs a pixel"));
   EXPECT_THAT(refused(R"({"id":"a","method":"network","mode":"antialiased","pixel":1})"),
               HasSubstr("was not measured"));
-  EXPECT_THAT(refused(R"({"id":"a","method":"none","low":2,"high":1})"), HasSubstr("no interval"));
-  EXPECT_THAT(refused(R"({"id":"a","method":"none","low":0,"high":1})"), HasSubstr("no interval"));
+  EXPECT_THAT(refused(R"({"id":"a","method":"none","low":2,"high":1})"), HasSubstr("low and high must be"));
+  EXPECT_THAT(refused(R"({"id":"a","method":"none","low":0,"high":1})"), HasSubstr("low and high must be"));
   EXPECT_THAT(refused(R"({"id":"a","method":"none","seconds":1e39})"), HasSubstr("seconds"));
   EXPECT_THAT(refused(R"({"id":"a","method":"none","made":"banana"})"), HasSubstr("banana"));
   EXPECT_THAT(refused(R"({"id":"a","method":"none","pixl":1})"), HasSubstr("unknown property pixl"));
   EXPECT_THAT(refused(R"({"id":"a"})"), HasSubstr("line 1: a property is missing"));
   const std::string twice = R"({"id":"a","method":"none"})";
-  EXPECT_THAT(refused(twice + "\n" + twice), HasSubstr("line 2: a is decided twice"));
+  EXPECT_THAT(refused(twice + "\n" + twice), HasSubstr("line 2: a has two decisions"));
 }
 
 ReadingRow Row(const std::string& id, const std::string& kind, const std::string& edit, const std::string& made,

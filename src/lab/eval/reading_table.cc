@@ -116,7 +116,9 @@ Result<std::vector<ReadingRow>> ReadReadingTable(const fs::path& path) {
     if (line > 1) {
       const ReadingRow& row = rows.emplace_back(RowFrom(object));
       const size_t values = row.features.values.size();
-      return values == 0 || values == FeatureNames().size() ? "" : "not as many features as the first line names";
+      return values == 0 || values == FeatureNames().size()
+                 ? ""
+                 : "has another number of features than the first line names";
     }
     const std::vector<double> multiples(kGainMultiples.begin(), kGainMultiples.end());
     const bool known = object.at("table") == "readings" && object.at("multiples") == json(multiples) &&
@@ -132,10 +134,10 @@ namespace {
 // Why no row can judge a decision; empty if one can.
 std::string WrongWith(const ReadingDecision& decision, const ReadingRow& row) {
   if (decision.method == "none") return "";
-  if (!(decision.pixel > 0) || !std::isfinite(decision.pixel)) return "a treatment needs a pixel, a length above 0";
+  if (!(decision.pixel > 0) || !std::isfinite(decision.pixel)) return "a treatment needs a pixel above 0";
   const RenderMode mode = decision.mode.value_or(row.DrawnMode());
   if (!row.gains.empty() && !row.gains.contains({mode, decision.method})) {
-    return Cat("'", decision.method, "' as ", NameOf(mode), " was not measured of this row",
+    return Cat("'", decision.method, "' as ", NameOf(mode), " was not measured for this row",
                row.tag ? Cat(", whose file says ", NameOf(*row.tag)) : "");
   }
   return "";
@@ -159,29 +161,29 @@ Result<std::map<std::string, ReadingDecision>> ReadReadingDecisions(const fs::pa
     }
     const auto id = object.at("id").get<std::string>();
     const auto row = by_id.find(id);
-    if (row == by_id.end()) return Cat("no row is called ", Printable(id));
+    if (row == by_id.end()) return Cat("unknown row ", Printable(id));
     ReadingDecision decision;
     decision.method = object.at("method").get<std::string>();
     if (decision.method != "none" && decision.method != "filter" && decision.method != "network") {
-      return Cat("method '", Printable(decision.method), "' is none of none, filter, network");
+      return Cat("method '", Printable(decision.method), "' is not none, filter or network");
     }
     const std::string mode = TextAt(object, "mode");
     decision.mode = RenderModeNamed(mode);
     if (!mode.empty() && !decision.mode) {
-      return Cat("mode '", Printable(mode), "' is none of classic, antialiased, mip");
+      return Cat("mode '", Printable(mode), "' is not classic, antialiased or mip");
     }
     decision.pixel = NumberAt(object, "pixel");
     decision.low = NumberAt(object, "low");
     decision.high = NumberAt(object, "high");
     const bool interval = decision.low > 0 && decision.high >= decision.low && std::isfinite(decision.high);
-    if (!interval && (decision.low != 0 || decision.high != 0)) return "low and high are no interval of lengths";
+    if (!interval && (decision.low != 0 || decision.high != 0)) return "low and high must be positive, in this order";
     decision.made = TextAt(object, "made");
-    if (!words.contains(decision.made)) return Cat("made: no row is called ", Printable(decision.made));
+    if (!words.contains(decision.made)) return Cat("made: unknown value ", Printable(decision.made));
     if (object.contains("gain")) decision.gain = object.at("gain").get<double>();
     decision.seconds = NumberAt(object, "seconds");
-    if (!(decision.seconds >= 0 && decision.seconds < kMostSeconds)) return "seconds are no time that a reading takes";
+    if (!(decision.seconds >= 0 && decision.seconds < kMostSeconds)) return "seconds are out of range";
     if (std::string wrong = WrongWith(decision, *row->second); !wrong.empty()) return wrong;
-    if (!decisions.emplace(id, std::move(decision)).second) return Cat(Printable(id), " is decided twice");
+    if (!decisions.emplace(id, std::move(decision)).second) return Cat(Printable(id), " has two decisions");
     return "";
   }));
   return decisions;

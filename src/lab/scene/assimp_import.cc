@@ -140,7 +140,7 @@ void CheckSizes(const aiScene& scene, const MeshLimits& limits) {
     for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
       if (int64_t{mesh.mFaces[f].mNumIndices} > limits.max_polygon) {
         throw std::runtime_error(
-            Cat("a face with ", mesh.mFaces[f].mNumIndices, " corners, at most ", limits.max_polygon, " are read"));
+            Cat("a face with ", mesh.mFaces[f].mNumIndices, " corners, more than the limit of ", limits.max_polygon));
       }
     }
   }
@@ -229,7 +229,7 @@ RawScene ImportWithAssimp(const AssimpFileReader& read, const std::string& name,
   if (scene == nullptr) throw std::runtime_error(Cat("cannot be read: ", Printable(importer.GetErrorString(), 300)));
   CheckSizes(*scene, limits);
   scene = importer.ApplyPostProcessing(aiProcess_Triangulate | aiProcess_TransformUVCoords);
-  if (scene == nullptr) throw std::runtime_error("its faces cannot be cut into triangles");
+  if (scene == nullptr) throw std::runtime_error("its faces cannot be split into triangles");
 
   RawScene out;
   Materials materials;

@@ -186,7 +186,7 @@ class Daylight {
 
 Status CutToEdges(Mesh& mesh, float longest_edge) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(mesh));
-  if (!(longest_edge > 0)) return Error{ErrorCode::kBadArgument, "edges are cut to a length above 0"};
+  if (!(longest_edge > 0)) return Error{ErrorCode::kBadArgument, "the longest edge must be above 0"};
   if (!Cutter(mesh, longest_edge).Cut()) {
     return Error{ErrorCode::kBadArgument,
                  Cat("a mesh with edges of at most ", longest_edge, " has more than ", kMostTriangles, " triangles")};

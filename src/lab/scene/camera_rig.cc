@@ -51,7 +51,7 @@ std::vector<Direction3> RandomDirections(const CameraRig& rig) {
 
 Status Check(const CameraRig& rig) {
   if (rig.views < 1 || rig.views > kMostViews) {
-    return Error{ErrorCode::kBadArgument, Cat("a rig has 1 to ", kMostViews, " views, not ", rig.views)};
+    return Error{ErrorCode::kBadArgument, Cat("a rig must have 1 to ", kMostViews, " views, not ", rig.views)};
   }
   if (!(rig.radius > 0) || !std::isfinite(rig.radius)) {
     return Error{ErrorCode::kBadArgument, Cat("the cameras' distance ", rig.radius, " is not positive")};

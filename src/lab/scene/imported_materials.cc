@@ -129,11 +129,11 @@ void LoadMaterials(const RawScene& scene, const AssetSource& source, const std::
       } else if (texture.error().code == ErrorCode::kNotFound) {
         warn("picture \"", Printable(raw.picture), "\" is missing");
       } else {
-        warn("picture is left out: ", texture.error().message);
+        warn("picture ignored: ", texture.error().message);
       }
     }
     if (!raw.mask.empty() && raw.mask != raw.picture) {
-      warn("separate opacity picture \"", Printable(raw.mask), "\" is left out");
+      warn("separate opacity picture \"", Printable(raw.mask), "\" ignored");
     }
     mesh.materials.push_back(std::move(material));
   }

@@ -139,19 +139,19 @@ void PrepareChild(const IsolationLimits& limits, uint64_t address_space) {
     };
     sent = Send(socket, Kind::kResult, work(ask));
   } catch (const std::bad_alloc&) {
-    sent = Send(socket, Kind::kFailure, "asks for more memory than there is");
+    sent = Send(socket, Kind::kFailure, "needs more memory than available");
   } catch (const std::exception& e) {
     sent = Send(socket, Kind::kFailure, e.what());
   } catch (...) {
-    sent = Send(socket, Kind::kFailure, "failed without a word");
+    sent = Send(socket, Kind::kFailure, "failed without a message");
   }
   ::_exit(sent ? 0 : 1);  // skips destructors and buffers of the parent's objects
 }
 
 std::string HowItEnded(int status, const IsolationLimits& limits) {
-  if (!WIFSIGNALED(status)) return Cat("the reader's process ended badly (exit code ", WEXITSTATUS(status), ")");
+  if (!WIFSIGNALED(status)) return Cat("the reader's process failed (exit code ", WEXITSTATUS(status), ")");
   const int signal = WTERMSIG(status);
-  if (signal == SIGKILL) return "was given up: no sign of life, or the system is out of memory";
+  if (signal == SIGKILL) return "the reader was killed: it stopped responding, or the system is out of memory";
   if (signal == SIGXCPU) return Cat("took more than ", limits.max_cpu_seconds, " s to read");
   return Cat("is so damaged that the reader crashed (signal ", signal, ")");
 }
@@ -168,7 +168,7 @@ Result<std::string> RunIsolated(const IsolationLimits& limits, const std::functi
     static std::mutex forking;
     const std::lock_guard lock(forking);
     if (::socketpair(AF_UNIX, SOCK_STREAM, 0, sockets.data()) != 0) {
-      return Error{ErrorCode::kIo, Cat("no connection to a new process: ", std::strerror(errno))};
+      return Error{ErrorCode::kIo, Cat("cannot connect to a new process: ", std::strerror(errno))};
     }
     for (const int socket : sockets) (void)::fcntl(socket, F_SETFD, FD_CLOEXEC);
     std::fflush(nullptr);
@@ -181,7 +181,7 @@ Result<std::string> RunIsolated(const IsolationLimits& limits, const std::functi
   }
   if (child < 0) {
     ::close(sockets[0]);
-    return Error{ErrorCode::kIo, Cat("the system makes no process: ", std::strerror(errno))};
+    return Error{ErrorCode::kIo, Cat("cannot start a process: ", std::strerror(errno))};
   }
   const timeval patience{10 * limits.max_cpu_seconds, 0};
   (void)::setsockopt(sockets[0], SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);

@@ -33,7 +33,7 @@ Status Take(const TensorFile& file, const std::string& name, TensorType type, in
   const bool rows = columns == 0 ? entry->shape.size() == 1 : entry->shape.size() == 2 && entry->shape[1] == columns;
   if (!rows || entry->type != type) {
     return Error{ErrorCode::kBadFile, Cat(file.name(), ": ", name, " is ", TypeName(entry->type), " ",
-                                          entry->ShapeText(), ", not what a mesh file has there")};
+                                          entry->ShapeText(), ", not the type or shape of a mesh file")};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Buffer<std::byte> bytes, CopyContiguous(*entry));
   out.resize(static_cast<size_t>(entry->shape[0]));

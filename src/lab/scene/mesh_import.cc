@@ -92,7 +92,7 @@ class FileDesk {
     if (unknown == 0) return;
     if (unknown > kMostNames) list += Cat(" and ", unknown - kMostNames, " more");
     warnings.push_back(Cat(unknown == 1 ? "material " : "materials ", list, unknown == 1 ? " is" : " are",
-                           " in no material library: grey"));
+                           " in no material library: drawn grey"));
   }
 
  private:
@@ -135,7 +135,7 @@ Result<RawScene> ReadScene(FileDesk& desk, const std::string& name, const MeshRe
 
 Result<ImportedMesh> Import(const AssetSource& source, const std::string& name, const MeshReadOptions& options) {
   if (!IsMeshName(name)) {
-    return Error{ErrorCode::kBadFile, "not a mesh by its ending (obj, gltf, glb, ply, dae, ac, stl, off)"};
+    return Error{ErrorCode::kBadFile, "has no mesh extension (obj, gltf, glb, ply, dae, ac, stl, off)"};
   }
   FileDesk desk(source, options.limits);
   ANCHORSPLAT_RETURN_IF_ERROR(desk.ReadMesh(name));
@@ -151,9 +151,9 @@ Result<ImportedMesh> Import(const AssetSource& source, const std::string& name, 
   out.not_finite = scene.not_finite;
   out.lines_and_points = desk.lines_and_points() + scene.not_triangles;
   out.has_normals = scene.has_normals;
-  if (out.degenerate > 0) out.warnings.push_back(Cat(out.degenerate, " triangles without area are left out"));
+  if (out.degenerate > 0) out.warnings.push_back(Cat(out.degenerate, " triangles without area skipped"));
   if (out.not_finite > 0)
-    out.warnings.push_back(Cat(out.not_finite, " triangles with impossible corners are left out"));
+    out.warnings.push_back(Cat(out.not_finite, " triangles with corners that are not finite skipped"));
   return out;
 }
 
@@ -171,7 +171,7 @@ Result<ImportedMesh> ImportMesh(const AssetSource& source, const std::string& na
     if (!imported.ok()) return Error{imported.error().code, Cat(where, ": ", imported.error().message)};
     return imported;
   } catch (const std::bad_alloc&) {
-    return Error{ErrorCode::kBadFile, Cat(where, ": asks for more memory than there is")};
+    return Error{ErrorCode::kBadFile, Cat(where, ": needs more memory than available")};
   } catch (const std::exception& e) {
     return Error{ErrorCode::kBadFile, Cat(where, ": ", Printable(e.what(), 300))};
   }

@@ -112,10 +112,11 @@ TEST(MeshImport, NamesMaterialsThatNoLibraryDefines) {
   MapAssets assets;
   assets.files = {{"a.obj", face}};  // and names no library, so that none is missing
   EXPECT_THAT(Import(assets, "a.obj").warnings,
-              ElementsAre("materials \"red\", \"dark green\" are in no material library: grey"));
+              ElementsAre("materials \"red\", \"dark green\" are in no material library: drawn grey"));
   assets.files = {
       {"a.obj", "mtllib a.mtl\nmtllib b.mtl\n" + face}, {"a.mtl", "newmtl red\n"}, {"b.mtl", "newmtl blue\n"}};
-  EXPECT_THAT(Import(assets, "a.obj").warnings, ElementsAre("material \"dark green\" is in no material library: grey"));
+  EXPECT_THAT(Import(assets, "a.obj").warnings,
+              ElementsAre("material \"dark green\" is in no material library: drawn grey"));
   std::string many;
   for (int i = 0; i < 30; ++i) many += "usemtl m" + std::to_string(i) + "\nf 1 2 3\n";
   assets.files["a.obj"] += many;
@@ -136,7 +137,7 @@ TEST(MeshImport, DropsTrianglesWithoutAreaAndCountsThem) {
   const ImportedMesh imported = Import(assets, "a.obj");
   EXPECT_EQ(imported.mesh.triangles.size(), 1u);
   EXPECT_EQ(imported.degenerate + imported.not_finite, 3);
-  EXPECT_THAT(imported.warnings, ::testing::Contains(HasSubstr("left out")));
+  EXPECT_THAT(imported.warnings, ::testing::Contains(HasSubstr("skipped")));
 }
 
 TEST(MeshImport, KeepsTheNormalsOfTheFile) {

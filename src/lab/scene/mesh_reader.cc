@@ -103,7 +103,7 @@ Result<ImportedMesh> ReadMesh(const std::string& address, const MeshReadOptions&
   if (parsed.library) {
     if (parsed.object.empty()) {
       return Error{ErrorCode::kBadArgument,
-                   Cat(address, ": is a library of many objects; name one as ", address, "#object")};
+                   Cat(address, ": is a library of several objects; choose one with ", address, "#object")};
     }
     ANCHORSPLAT_ASSIGN_OR_RETURN(const FurnitureCatalog catalog, FurnitureCatalog::Open(parsed.file, options.limits));
     const CatalogEntry* entry = catalog.Find(parsed.object);

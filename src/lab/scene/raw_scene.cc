@@ -174,7 +174,7 @@ Result<RawScene> Unpack(std::string_view bytes) {
   in.Number(scene.not_triangles);
   in.Flag(scene.has_normals);
   if (!in.AtEnd() || !KeepsItsPromises(scene)) {
-    return Error{ErrorCode::kBadFile, "is so damaged that its reader went wrong"};
+    return Error{ErrorCode::kBadFile, "is so damaged that its reader failed"};
   }
   return scene;
 }

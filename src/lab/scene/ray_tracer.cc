@@ -182,16 +182,16 @@ Result<RayTracer> RayTracer::Create(Mesh mesh) {
   };
   if (scene->device == nullptr) return embree_error("does not start");
   scene->embree.reset(rtcNewScene(scene->device.get()));
-  if (scene->embree == nullptr) return embree_error("makes no scene");
+  if (scene->embree == nullptr) return embree_error("cannot make a scene");
   rtcSetSceneBuildQuality(scene->embree.get(), RTC_BUILD_QUALITY_HIGH);  // every tree is queried a billion times
   rtcSetSceneFlags(scene->embree.get(), RTC_SCENE_FLAG_ROBUST);          // no rays pass between adjacent triangles
   for (const bool with_holes : {false, true}) {
     Part& part = scene->parts[with_holes ? 1 : 0];
-    if (!part.triangles.empty() && !scene->Attach(part, with_holes)) return embree_error("does not take the triangles");
+    if (!part.triangles.empty() && !scene->Attach(part, with_holes)) return embree_error("refuses the triangles");
   }
   // A single-threaded arena that Embree's tasks cannot leave; other runs keep their threads.
   tbb::task_arena(1).execute([&] { rtcCommitScene(scene->embree.get()); });
-  if (rtcGetDeviceError(scene->device.get()) != RTC_ERROR_NONE) return embree_error("does not build its tree");
+  if (rtcGetDeviceError(scene->device.get()) != RTC_ERROR_NONE) return embree_error("cannot build its tree");
   return RayTracer(std::move(scene));
 }
 

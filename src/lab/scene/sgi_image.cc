@@ -47,7 +47,7 @@ Result<SgiImage> DecodeSgi(const std::string& where, std::string_view bytes, int
   const auto bad = [&](size_t at, const std::string& what) {
     return Error{ErrorCode::kBadFile, Cat(where, ": byte ", at, ": ", what)};
   };
-  if (!IsSgi(bytes)) return bad(0, "no SGI picture");
+  if (!IsSgi(bytes)) return bad(0, "not an SGI picture");
   const bool packed = bytes[2] == 1;
   const auto sample = static_cast<size_t>(bytes[3]);
   const uint32_t dimensions = Big(bytes, 4, 2);
@@ -57,7 +57,7 @@ Result<SgiImage> DecodeSgi(const std::string& where, std::string_view bytes, int
   if (dimensions < 1 || dimensions > 3 || width == 0 || height == 0 || channels < 1 || channels > 4) {
     return bad(4, Cat("a picture of ", width, " x ", height, " with ", channels, " channels"));
   }
-  if (static_cast<int64_t>(width * height) > max_pixels) return bad(6, "more pixels than a texture may have");
+  if (static_cast<int64_t>(width * height) > max_pixels) return bad(6, "too many pixels for a texture");
   const size_t rows = height * channels;
   // A packed row takes at least two bytes per 127 values, a raw one its size. Checked before allocating.
   const size_t tables = packed ? rows * 8 : 0;

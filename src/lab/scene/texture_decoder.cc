@@ -119,7 +119,7 @@ Result<Texture> Decode(const std::string& name, const std::string& bytes, int64_
   }
   const std::string end = name.size() < 4 ? "" : name.substr(name.size() - 4);
   if (view.starts_with("BM") || end == ".tga" || end == ".TGA") return ThroughStb(name, bytes, max_pixels);
-  return Error{ErrorCode::kBadFile, Cat(name, ": neither PNG, JPEG, WebP, SGI, BMP nor Targa")};
+  return Error{ErrorCode::kBadFile, Cat(name, ": is not PNG, JPEG, WebP, SGI, BMP or Targa")};
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 Status MakeFolder(const fs::path& folder) {
   std::error_code code;
   fs::create_directories(folder, code);
-  if (code) return Error{ErrorCode::kIo, Cat(folder.string(), ": cannot make this folder: ", code.message())};
+  if (code) return Error{ErrorCode::kIo, Cat(folder.string(), ": cannot create this folder: ", code.message())};
   return {};
 }
 
@@ -60,7 +60,7 @@ Status WritePoints(const RayTracer& tracer, const fs::path& folder, const Camera
 Status CheckSizes(const ViewSetOptions& options) {
   for (const int size : {options.low_size, options.high_size}) {
     if (size < 1 || size > 16384) {
-      return Error{ErrorCode::kBadArgument, Cat("views have 1 to 16384 pixels a side, not ", size)};
+      return Error{ErrorCode::kBadArgument, Cat("views must have 1 to 16384 pixels per side, not ", size)};
     }
   }
   if (options.low_size == options.high_size) {
@@ -110,8 +110,8 @@ Result<ViewSetCost> WriteViews(const RayTracer& tracer, const fs::path& folder, 
   const Stopwatch watch;
   ANCHORSPLAT_RETURN_IF_ERROR(CheckSizes(options));
   if (cameras.low.cameras.empty() || cameras.low.cameras.size() != cameras.high.cameras.size()) {
-    return Error{ErrorCode::kBadArgument, Cat("views of ", cameras.low.cameras.size(), " and ",
-                                              cameras.high.cameras.size(), " places; both need the same ones")};
+    return Error{ErrorCode::kBadArgument, Cat("there are ", cameras.low.cameras.size(), " low and ",
+                                              cameras.high.cameras.size(), " high views; expected the same number")};
   }
   const WriteOptions write{.overwrite = options.overwrite || keep};
   const fs::path low = folder / std::to_string(options.low_size), high = folder / std::to_string(options.high_size);
@@ -141,7 +141,7 @@ Result<ViewSetCost> WriteViews(const RayTracer& tracer, const fs::path& folder, 
     {
       const std::lock_guard<std::mutex> lock(mutex);
       if (failed.ok() && StopRequested()) {
-        failed = Error{ErrorCode::kInterrupted, Cat(folder.string(), ": stopped while the views were made")};
+        failed = Error{ErrorCode::kInterrupted, Cat(folder.string(), ": stopped while making the views")};
       }
       if (!failed.ok()) return;
     }

@@ -135,13 +135,13 @@ class Objective : public torch::autograd::Function<Objective> {
 
 PhotometricLossSum PhotometricObjective(std::span<const torch::Tensor> rendered, std::span<const TrueView> truth,
                                         const LossConfig& weights) {
-  if (rendered.size() != truth.size()) throw std::invalid_argument("as many rendered views as true ones, please");
+  if (rendered.size() != truth.size()) throw std::invalid_argument("the numbers of rendered and true views differ");
   std::vector<ViewLoss> views(rendered.size());
   std::vector<torch::Tensor> inputs;
   for (size_t v = 0; v < rendered.size(); ++v) {
     const Image& picture = truth[v].picture;
     if (rendered[v].sizes() != torch::IntArrayRef({3, picture.height, picture.width})) {
-      throw std::invalid_argument("a rendered view has another size than the true one");
+      throw std::invalid_argument("the sizes of a rendered and a true view differ");
     }
     inputs.push_back(rendered[v].contiguous());
     // Outside the parallel loop below, because LibTorch has threads of its own.

@@ -45,7 +45,7 @@ Result<int> Number(const char* name, int low, int high) {
   if (code != std::errc() || end != value.data() + value.size() || number < low || number > high) {
     return Error{ErrorCode::kBadArgument,
                  Cat("environment: ", name, " is \"", Printable(value), "\", expected a number from ", low, " to ",
-                     high, " (WORLD_SIZE, RANK, MASTER_ADDR and MASTER_PORT belong together)")};
+                     high, " (set WORLD_SIZE, RANK, MASTER_ADDR and MASTER_PORT together)")};
   }
   return number;
 }
@@ -77,7 +77,7 @@ Result<std::unique_ptr<ProcessGroup>> ProcessGroup::FromEnvironment() {
     return std::unique_ptr<ProcessGroup>(std::make_unique<GlooGroup>(std::move(gloo), rank, size));
   } catch (const std::exception& failure) {
     return Error{ErrorCode::kIo,
-                 Cat("the ", size, " processes at ", address, ":", port, " did not find each other: ", failure.what())};
+                 Cat("the ", size, " processes at ", address, ":", port, " could not connect: ", failure.what())};
   }
 }
 

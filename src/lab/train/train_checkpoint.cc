@@ -37,8 +37,8 @@ Status Compare(const std::string& file, const char* what, const std::string& the
     nlohmann::json both = a;
     both.update(b);
     for (const auto& [key, unused] : both.items()) {
-      const std::string then = a.contains(key) ? a[key].dump() : "not there",
-                        now = b.contains(key) ? b[key].dump() : "not there";
+      const std::string then = a.contains(key) ? a[key].dump() : "missing",
+                        now = b.contains(key) ? b[key].dump() : "missing";
       if (then == now) continue;
       return Error{ErrorCode::kBadArgument, Cat(file, ": is a checkpoint of another training: its ", key, " is ",
                                                 Printable(then), ", this one's ", Printable(now))};

@@ -114,7 +114,7 @@ class TableReader {
     if (first_.ok() && table_ != nullptr) {
       for (const auto& [key, node] : *table_) {
         if (taken_.count(std::string(key.str())) == 0) {
-          Complain(std::string(key.str()), node, "there is no such setting");
+          Complain(std::string(key.str()), node, "unknown setting");
           break;
         }
       }
@@ -283,7 +283,7 @@ Result<TrainConfig> ConfigFrom(const std::string& file, const toml::table& root)
   ANCHORSPLAT_RETURN_IF_ERROR(table.Finish());
   if (config.data.part > 0 && config.augmentation.drop > 0) {
     return Error{ErrorCode::kBadFile,
-                 Cat(file, ": data.part: not together with augmentation.drop, which changes who is whose neighbour")};
+                 Cat(file, ": data.part: cannot be used with augmentation.drop, which changes the neighbours")};
   }
   return config;
 }

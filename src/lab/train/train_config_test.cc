@@ -73,7 +73,7 @@ TEST(TrainConfig, ComplaintsNameFileLineAndKey) {
     const auto config = ParseTrainConfig(text, "x.toml");
     return config.ok() ? std::string("no complaint") : config.error().message;
   };
-  EXPECT_EQ(complaint("\nstep = 3\n"), "x.toml: line 2: step: there is no such setting");
+  EXPECT_EQ(complaint("\nstep = 3\n"), "x.toml: line 2: step: unknown setting");
   EXPECT_EQ(complaint("[optimizer]\nclip = -1\n"), "x.toml: line 2: optimizer.clip: expected a number from 0 to 1e+09");
   EXPECT_EQ(complaint("[data]\ncrop = 2.5\n"), "x.toml: line 2: data.crop: expected a whole number from 0 to 16384");
   EXPECT_EQ(complaint("[loss]\nlpips_net = \"resnet\"\n"),
@@ -85,7 +85,7 @@ TEST(TrainConfig, ComplaintsNameFileLineAndKey) {
   EXPECT_EQ(complaint("[captures]\nhold_out = 1\n"),
             "x.toml: line 2: captures.hold_out: expected a whole number from 2 to 1000");
   EXPECT_THAT(complaint("[data]\npart = 100\n[augmentation]\ndrop = 0.1\n"),
-              HasSubstr("x.toml: data.part: not together with augmentation.drop"));
+              HasSubstr("x.toml: data.part: cannot be used with augmentation.drop"));
   for (const char* range : {"least_upscale = 2", "greatest_upscale = 4", "least_upscale = 4\ngreatest_upscale = 2",
                             "least_upscale = 0.5\ngreatest_upscale = 2"}) {
     EXPECT_THAT(complaint(std::string("[data]\n") + range + "\n"), HasSubstr("x.toml: data.least_upscale and"))

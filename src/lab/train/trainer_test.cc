@@ -302,13 +302,13 @@ TEST(Trainer, SaysWhatIsWrong) {
   EXPECT_THAT(error("[optimizer.groups]\nbackbon = 1e-3\n"),
               HasSubstr("bad.toml: optimizer.groups.backbon: the network \"anchorsplat\" has no such group; it has "
                         "backbone, features_dc"));
-  EXPECT_THAT(error("part = 100\n"), HasSubstr("data.part: this network sees a splat as a whole"));
+  EXPECT_THAT(error("part = 100\n"), HasSubstr("data.part: this network needs the whole splat"));
   TrainRequest request = Request("bad", Set() / "bad.toml");
   std::ofstream(request.config) << "[network]\nkind = \"anchorsplat\"\ncopies = 0\n";
   EXPECT_THAT(Train(request).error().message,
               HasSubstr("bad.toml: line 3: network.copies: expected a whole number from 1 to 256"));
   std::ofstream(request.config) << "[network]\nkind = \"perceptron\"\n";
-  EXPECT_THAT(Train(request).error().message, HasSubstr("bad.toml: line 2: network.kind: there is no network"));
+  EXPECT_THAT(Train(request).error().message, HasSubstr("bad.toml: line 2: network.kind: unknown network"));
   request.datasets = {Set() / "nowhere"};
   EXPECT_EQ(Train(request).error().code, ErrorCode::kNotFound);
 }

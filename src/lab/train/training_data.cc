@@ -29,7 +29,7 @@ Status AppendScenes(const fs::path& dataset, const std::string& split, std::vect
     if (whole.ok()) {
       scenes.push_back(entry);
     } else {
-      LogWarning(Cat(entry.name, " is left out: ", whole.error().message));
+      LogWarning(Cat(entry.name, " skipped: ", whole.error().message));
     }
   }
   return {};
@@ -76,13 +76,13 @@ Result<TrainingData> FindTrainingData(const TrainRequest& request, const Capture
   const size_t before = data.training.size();
   std::erase_if(data.training, [&](const SceneEntry& entry) { return held_out.contains(entry.name); });
   if (data.training.size() != before) {
-    LogWarning(Cat(before - data.training.size(), " objects are for validation, too, and not trained on"));
+    LogWarning(Cat(before - data.training.size(), " objects are used for validation, so not for training"));
   }
   if (!request.captures.empty()) {
     ANCHORSPLAT_RETURN_IF_ERROR(AppendCaptures(request.captures, captures, cache, data.captures));
   }
   if (data.training.empty() && data.captures.empty()) {
-    return Error{ErrorCode::kNotFound, "no objects to train on: none of the data sets has one with a splat"};
+    return Error{ErrorCode::kNotFound, "no objects to train on: the data sets contain none with a splat"};
   }
   nlohmann::json names = nlohmann::json::array();
   for (const SceneEntry& entry : data.training) names.push_back(entry.name);

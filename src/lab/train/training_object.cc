@@ -33,7 +33,7 @@ Status TakeSplat(const GaussianCloud& all, std::vector<Camera> fitted, CameraPix
     if (IsFinite(all, i)) rows.push_back(i);
   }
   if (rows.empty()) {
-    return Error{ErrorCode::kBadFile, Cat(object.name, ": its splat has no Gaussian whose values are all finite")};
+    return Error{ErrorCode::kBadFile, Cat(object.name, ": its splat has no Gaussian with finite values")};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(object.cloud, Subset(all, rows));
   object.strength = DefaultFilterStrength(object.upscale, object.cloud.render_mode);
@@ -57,8 +57,8 @@ Result<std::shared_ptr<TrainingObject>> OpenTrainingCapture(const TrainingCaptur
   ANCHORSPLAT_ASSIGN_OR_RETURN(Capture capture,
                                OpenCapture(entry.capture.name, entry.capture.folder, entry.recipe, entry.fit_folder));
   if (capture.held_out.empty()) {
-    return Error{ErrorCode::kBadFile,
-                 Cat(entry.capture.folder.string(), ": no view is held out, so none is left to ", "train on")};
+    return Error{ErrorCode::kBadFile, Cat(entry.capture.folder.string(),
+                                          ": no view is held out, so there is no ground truth to ", "train on")};
   }
   auto object = std::make_shared<TrainingObject>();
   object->name = capture.name;
@@ -88,7 +88,7 @@ Result<std::shared_ptr<TrainingObject>> OpenTrainingObject(const SceneEntry& ent
   object->low_views = scene.low_views();
   object->upscale = static_cast<double>(scene.high_views()[0].intrinsics.width) /
                     static_cast<double>(scene.low_views()[0].intrinsics.width);
-  if (!(object->upscale >= 1)) return bad("its high views are smaller than its low ones");
+  if (!(object->upscale >= 1)) return bad("its high-resolution views are smaller than its low-resolution ones");
   ANCHORSPLAT_RETURN_IF_ERROR(TakeSplat(all, scene.low_views(), CameraPixelRule::kMedian, *object));
 
   object->validation = scene.held_out();
@@ -97,7 +97,7 @@ Result<std::shared_ptr<TrainingObject>> OpenTrainingObject(const SceneEntry& ent
   std::erase_if(fitted, [&](size_t view) {
     return std::find(object->validation.begin(), object->validation.end(), view) != object->validation.end();
   });
-  if (fitted.empty()) return bad("all of its views are held out: none is left to train on");
+  if (fitted.empty()) return bad("all its views are held out, so none is left to train on");
   object->training = Drawn(std::move(fitted), static_cast<size_t>(views_per_object), object->name);
   if (object->validation.empty()) object->validation = object->training;
   object->truth = std::make_shared<TrueViews>(entry, scene, cache);

@@ -152,11 +152,11 @@ Result<TrueViews::Part> TrueViews::Read(size_t view) const {
   }
   ANCHORSPLAT_RETURN_IF_ERROR(Make({&view, 1}));
   const auto file = Find(view);
-  if (!file) return Error{ErrorCode::kIo, Cat(folder_.string(), ": view ", names_[view], " is gone again")};
+  if (!file) return Error{ErrorCode::kIo, Cat(folder_.string(), ": view ", names_[view], " has disappeared")};
   ANCHORSPLAT_ASSIGN_OR_RETURN(Image part, ReadImage(file->path));
   if (part.width > width - file->x || part.height > height - file->y) {
-    return Error{ErrorCode::kBadFile, Cat(file->path.string(), ": reaches out of its view; remove the folder ",
-                                          folder_.string(), " to have it made again")};
+    return Error{ErrorCode::kBadFile, Cat(file->path.string(), ": does not fit its view. Remove the folder ",
+                                          folder_.string(), " to rebuild it")};
   }
   const PixelBox box = {file->x, file->y, file->x + part.width, file->y + part.height};
   return Part{std::move(part), box, {}};

@@ -28,7 +28,7 @@ expect 4 "no splat" "$program" info "$work/text.ply"
 expect 5 "a file that exists" "$program" convert "$scan" "$work/some/scan.spz"
 expect 6 "where no file can be written" "$program" convert "$scan" /proc/x.ply
 expect 6 "a full disk under stdout" bash -c "'$program' info '$scan' >/dev/full"
-says stderr "standard output could not be written"
+says stderr "cannot write to standard output"
 
 # Pipes, which can be read only once and have neither name nor size.
 from_pipe() { cat "$piped" | "$program" "$@"; }
@@ -47,9 +47,9 @@ gzip -k "$work/scan.splat" && piped=$work/scan.splat.gz
 expect 0 "a packed pipe, whose name is in it" from_pipe convert - "$work/unpacked.ply" -q
 expect 0 "it is the same" cmp "$work/told.ply" "$work/unpacked.ply"
 expect 2 "a pipe twice" from_pipe compare - - --orbit 2
-says stderr "standard input is a pipe and has been read already"
+says stderr "standard input is a pipe and was read already"
 expect 2 "no folder for outputs" "$program" convert "$scan" --out-dir - --to spz
-says stderr "--out-dir -: is standard output, not a folder"
+says stderr "--out-dir -: means standard output"
 expect 2 "nor of enhance" "$program" enhance "$scan" --out-dir - --method filter
 out() { "$program" "$@" >"$work/out" 2>"$work/err"; }
 expect 0 "convert to standard output" out convert "$scan" - --to spz
@@ -80,7 +80,7 @@ expect 2 "levels of detail" "$program" convert "$scan" - --to ply --lod
 expect 2 "no format" "$program" convert "$scan" - --to obj
 expect 2 "a format for a file" "$program" enhance "$scan" -o "$work/x.ply" --to spz
 expect 6 "a full disk under it" bash -c "'$program' convert '$scan' - --to ply >/dev/full"
-says stderr "standard output could not be written"
+says stderr "cannot write to standard output"
 expect 6 "nobody reads it" bash -c "set -o pipefail; '$program' convert '$input' - --to ply 2>'$work/err' | head -c 1 >/dev/null; exit \${PIPESTATUS[0]}"
 expect 4 "nothing comes out of a bad file" out convert "$work/text.ply" - --to ply -q
 expect 0 "not a byte" test ! -s "$work/out"

@@ -55,11 +55,11 @@ says stdout '"there_already": 5'
 expect 0 "evaluation by kind" "$program" eval "$work/kinds" -o "$work/kinds-eval" --methods raw,filter --kinds plain,packed
 says stdout "| packed | filter | 2 |"
 expect 2 "a kind that is not there" "$program" eval "$work/kinds" -o "$work/kinds-eval" --methods raw --kinds enhanced
-says stderr "there are noisy, packed, plain"
+says stderr "known: noisy, packed, plain"
 expect 2 "an object of another kind" "$program" eval "$work/kinds" -o "$work/kinds-eval" --methods raw --kinds packed --objects ramp--plain
-says stderr "of the kind 'plain', which --kinds leaves out"
+says stderr "of the kind 'plain', which --kinds excludes"
 expect 1 "what is made from a splat that failed" "$program" dataset build "$work/mesh/point.obj" -o "$work/kinds" "${small[@]}" --recipe "$work/kinds.toml" --json
-expect 0 "says so" grep -q '"message":"is made from point--plain, which is not there.*"stage":"base"' "$work/kinds/failures.jsonl"
+expect 0 "says so" grep -q '"message":"is made from point--plain, which is missing.*"stage":"base"' "$work/kinds/failures.jsonl"
 
 mkdir "$work/mesh/copy" && cp "$work/mesh/quad.obj" "$work/mesh/copy/"
 echo "no archive" >"$work/mesh/bad.sh3f"
@@ -81,7 +81,7 @@ expect 0 "evaluation of views on demand" "$program" eval "$work/demand" -o "$wor
 # A folder that is no object of the data set is not replaced by one, nor one that holds what the object is made of.
 mkdir -p "$work/taken/quad" && echo mine >"$work/taken/quad/file"
 expect 1 "a folder in the way of an object" "$program" dataset build "$work/mesh/quad.obj" -o "$work/taken" "${small[@]}"
-expect 0 "says what it is" grep -q "is in the way of the object's folder" "$work/taken/failures.jsonl"
+expect 0 "says what it is" grep -q "is a folder where the object's should be" "$work/taken/failures.jsonl"
 expect 0 "it is still there" grep -q mine "$work/taken/quad/file"
 expect 0 "build over an object of its own" "$program" dataset build "$work/mesh/quad.obj" -o "$work/demand" "${small[@]}" -w --json
 says stdout '"built": 1'

@@ -47,7 +47,7 @@ expect 0 "a page" elsewhere "$installed" view "$work/enhanced.ply" -o "$work/pag
 
 # doctor: every part has a state, and what is missing comes with a command.
 expect 0 "doctor" elsewhere "$installed" doctor
-for word in "anchorsplat    $version" processor SIMD bfloat16 threads memory "in the program, 4 Gaussians for one" training \
+for word in "anchorsplat    $version" processor SIMD bfloat16 threads memory "built in, 4 Gaussians for each" training \
             LPIPS "none in $work/.local/share/anchorsplat/lpips" scripts/fetch-lpips.sh; do
   says stdout "$word"
 done

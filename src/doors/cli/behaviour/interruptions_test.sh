@@ -55,14 +55,14 @@ expect 130 "a fit to go on with" stopped
 picture=$(find "$work/project/hr" -name '*.png' | sort | sed -n 2p)
 cp "$picture" "$work/picture.png" && cp "$(find "$work/project/hr" -name '*.png' | sort | sed -n 3p)" "$picture"
 expect 2 "it does not go on with another picture" resumed
-says stderr "its set of pictures is another"
+says stderr "its set of pictures differs"
 cp "$work/picture.png" "$picture" && cp "$work/project/transforms.json" "$work/transforms.json"
 sed -i 's/"fl_x": 1236/"fl_x": 1237/' "$work/project/transforms.json"
 expect 2 "it does not go on with other cameras" resumed
-says stderr "its set of cameras is another"
+says stderr "its set of cameras differs"
 cp "$work/transforms.json" "$work/project/transforms.json"
 expect 2 "it does not go on from another start" resumed --init-splat "$input"
-says stderr "its start is another"
+says stderr "its start differs"
 cp "$work/part.ply.checkpoint" "$work/checkpoint"
 printf 'anchorsplat' | dd of="$work/part.ply.checkpoint" bs=1 seek=60000 conv=notrunc status=none
 expect 4 "it does not go on from a damaged state" resumed
@@ -104,8 +104,8 @@ printf 'v -1 0 0\nv 1 0 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n' | tee "$work/square.o
 expect 130 "SIGHUP ends the build of a data set in order" hung_up_build
 expect 0 "the state of the fit is there" test -s "$work/set/.building/other/fit.checkpoint"
 expect 4 "the data set is not whole" "$program" dataset check "$work/set"
-says stdout "other: the build that was to make it has not ended"
-says stdout "square: the build that was to make it has not ended"
+says stdout "other: is missing: its build was interrupted"
+says stdout "square: is missing: its build was interrupted"
 expect 0 "info counts both" "$program" dataset info "$work/set" --json
 says stdout '"unfinished": 2'
 # What nobody can go on with ends at once and leaves nothing. A splat that takes a while: the small one over and over.
@@ -220,7 +220,7 @@ homeless() {
   wait $child
 }
 expect 3 "a fit that loses its folder" homeless
-says stderr "the state after 5,000 steps is kept in $work/state"
+says stderr "the state after 5,000 steps is saved in $work/state"
 mkdir "$work/gone"
 expect 0 "it is finished at once" fit -o "$work/gone/splat.ply" --steps $some --checkpoint "$work/state" --resume
 expect 0 "its splat is there at last" "$program" info "$work/gone/splat.ply"

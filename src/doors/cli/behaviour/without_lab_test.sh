@@ -9,7 +9,7 @@ says stdout "Gaussians"
 expect 0 "compare" "$program" compare "$input" "$work/out.ply" --orbit 2 --size 32x32 --lpips if-there
 says stderr "LPIPS missing: this program was built without the lab"
 expect 3 "compare by LPIPS" "$program" compare "$input" "$work/out.ply" --orbit 2 --size 32x32 --lpips alex
-says stderr "LPIPS missing: this program was built without the lab; --lpips if-there goes on without"
+says stderr "LPIPS missing: this program was built without the lab; --lpips if-there continues without it"
 
 for words in "eval $work -o $work/eval" "views $work/box.obj -o $work/views" "dataset build $work/box.obj -o $work/set --jobs 2" \
   "train $work/set --config none.toml -o $work/run" "bench render --repeats 1" eval; do

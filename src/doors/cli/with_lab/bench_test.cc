@@ -104,7 +104,7 @@ TEST(BenchVerb, ReadingMakesRowsAndGoesOn) {
   ExpectRefused({"bench", "reading", "--tasks", tasks}, ErrorCode::kBadArgument, {"--output"});
   const std::string task = R"({"id":"a","splat":"a.ply"})";
   ASSERT_TRUE(WriteWholeFile(tasks, task + "\n\n" + task, true).ok());
-  ExpectRefused(words, ErrorCode::kBadFile, {"line 3: a is there twice"});
+  ExpectRefused(words, ErrorCode::kBadFile, {"line 3: a is listed twice"});
   ASSERT_TRUE(WriteWholeFile(tasks, "{}\n", true).ok());
   ExpectRefused(words, ErrorCode::kBadFile, {"line 1"});
 }

@@ -65,6 +65,7 @@ void AddDatasetSplit(CLI::App& parent, Program& program) {
     verb.add_option_function<std::string>(
             "--" + split + "-list", [flags, split](const std::string& file) { flags->lists[split] = file; },
             "Text file of the meshes for " + split + ", instead of fractions")
+        ->type_name("FILE")
         ->check(NotEmpty());
   }
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunSplit(*flags, program.flags); }; });
@@ -157,7 +158,7 @@ Status RunInfo(const std::string& dataset, const SharedFlags& shared) {
 }
 
 void AddDatasetInfo(CLI::App& parent, Program& program) {
-  CLI::App& verb = AddVerb(parent, program, "info", "What a data set holds", "anchorsplat dataset info data/ --json");
+  CLI::App& verb = AddVerb(parent, program, "info", "Summarise a data set", "anchorsplat dataset info data/ --json");
   const auto dataset = std::make_shared<std::string>();
   verb.add_option("dataset", *dataset, "Folder of the data set")->required()->check(NotEmpty());
   verb.callback(

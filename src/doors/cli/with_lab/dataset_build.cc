@@ -105,13 +105,14 @@ Status RunBuild(const BuildFlags& flags, Program& program) {
                {"seconds", r.seconds}});
   } else if (!shared.quiet) {
     std::cout << OneLine(flags.output) << ": " << r.objects << (r.objects == 1 ? " object: " : " objects: ") << r.built
-              << " built in " << HumanSeconds(r.seconds) << ", " << r.there_already << " there already, " << r.failed
+              << " built in " << HumanSeconds(r.seconds) << ", " << r.there_already << " already there, " << r.failed
               << " failed, " << r.rejected << " rejected for their training PSNR\n";
     if (r.other_settings > 0) {
-      std::cout << r.other_settings << " of those there " << (r.other_settings == 1 ? "was" : "were")
+      std::cout << r.other_settings << " of them " << (r.other_settings == 1 ? "was" : "were")
                 << " made with other settings; -w makes them again\n";
     }
-    if (r.failed > 0) std::cout << "why: " << OneLine(flags.output) << "/failures.jsonl; --retry tries them again\n";
+    if (r.failed > 0)
+      std::cout << "reasons are in " << OneLine(flags.output) << "/failures.jsonl; --retry retries them\n";
   }
   if (r.interrupted) {
     return Error{ErrorCode::kInterrupted, Cat(flags.output, ": stopped; run the same command to continue")};
@@ -128,12 +129,19 @@ void AddDatasetBuild(CLI::App& parent, Program& program) {
   const auto flags = std::make_shared<BuildFlags>();
   verb.add_option("meshes", flags->meshes,
                   "Mesh files, furniture libraries, catalog.sh3f#object, or folders of pictures with cameras");
-  auto* objects = verb.add_option("--objects", flags->objects, "Folder of the meshes in --list")->check(NotEmpty());
+  auto* objects = verb.add_option("--objects", flags->objects, "Folder of the meshes in --list")
+                      ->type_name("FOLDER")
+                      ->check(NotEmpty());
   verb.add_option("--list", flags->list, "Text file with a mesh per line, such as data/test-30.txt")
+      ->type_name("FILE")
       ->check(NotEmpty())
       ->needs(objects);
-  verb.add_option("-o,--output", flags->output, "Folder of the data set")->required()->check(NotEmpty());
+  verb.add_option("-o,--output", flags->output, "Folder of the data set")
+      ->type_name("FOLDER")
+      ->required()
+      ->check(NotEmpty());
   verb.add_option("--recipe", flags->recipe, "TOML file with a mix of fit schedules and resolutions")
+      ->type_name("FILE")
       ->check(NotEmpty());
   verb.add_option("--steps", flags->settings.fit_steps, "Steps of the low-quality fits")
       ->check(CLI::Range(1, 10'000'000))
@@ -157,8 +165,11 @@ void AddDatasetBuild(CLI::App& parent, Program& program) {
       ->check(NotNegative())
       ->capture_default_str();
   verb.add_option("--licence", flags->licence, "Licence of meshes that name none, such as GPL-2.0-or-later")
+      ->type_name("NAME")
       ->check(NotEmpty());
-  verb.add_option("--creator", flags->creator, "Creator of meshes that name none")->check(NotEmpty());
+  verb.add_option("--creator", flags->creator, "Creator of meshes that name none")
+      ->type_name("NAME")
+      ->check(NotEmpty());
   verb.add_flag("--retry", flags->retry, "Retry objects that failed in an earlier run");
   verb.add_flag(
       "--plan", flags->plan,
@@ -177,7 +188,7 @@ struct ObjectFlags {
   std::string output;
 };
 
-// What `build` starts for every object; not for people.
+// Started by `build` for every object; internal.
 Status RunObject(const ObjectFlags& flags) {
   DieWithParent();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ObjectJob job, ReadObjectJob(flags.job));
@@ -193,7 +204,10 @@ void AddDatasetObject(CLI::App& parent, Program& program) {
                            "anchorsplat dataset object data/.building/chair.job -o data/");
   const auto flags = std::make_shared<ObjectFlags>();
   verb.add_option("job", flags->job, "File that says what to make")->required();
-  verb.add_option("-o,--output", flags->output, "Folder of the data set")->required()->check(NotEmpty());
+  verb.add_option("-o,--output", flags->output, "Folder of the data set")
+      ->type_name("FOLDER")
+      ->required()
+      ->check(NotEmpty());
   verb.group("");  // not listed
   verb.callback([flags, &program] { program.run = [flags] { return RunObject(*flags); }; });
 }

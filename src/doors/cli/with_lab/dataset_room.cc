@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kRoomName = "room.json";  // beside the views: what they were made from
+constexpr const char* kRoomName = "room.json";  // beside the views: their settings
 
 struct RoomFlags {
   std::string furniture;
@@ -43,7 +43,7 @@ struct RoomFlags {
   }
 };
 
-// Equal text, equal pictures.
+// Equal text means equal pictures.
 std::string RoomText(const RoomFlags& flags, const std::vector<PlacedMesh>& pieces) {
   nlohmann::json list = nlohmann::json::array();
   for (const PlacedMesh& p : pieces) {
@@ -79,20 +79,19 @@ Status RunRoom(const RoomFlags& given, const SharedFlags& shared) {
   if (IsFile(note) && !shared.overwrite) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string earlier, ReadFileBytes(note, uint64_t{1} << 20));
     if (earlier != text) {
-      return Error{
-          ErrorCode::kExists,
-          Cat(folder.string(), ": has views that were made with other settings or furniture; -w makes them again")};
+      return Error{ErrorCode::kExists,
+                   Cat(folder.string(), ": has views made with other settings or furniture; -w makes them again")};
     }
     keep = true;
   }
   std::error_code code;
   fs::create_directories(folder, code);
-  if (code) return Error{ErrorCode::kIo, Cat(folder.string(), ": cannot make this folder: ", code.message())};
+  if (code) return Error{ErrorCode::kIo, Cat(folder.string(), ": cannot create this folder: ", code.message())};
   room.daylight.longest_edge = static_cast<float>(flags.light_every);
-  LogInfo("daylight is computed");
+  LogInfo("computing daylight");
   ANCHORSPLAT_RETURN_IF_ERROR(BakeDaylight(room.mesh, room.daylight));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const RayTracer tracer, RayTracer::Create(std::move(room.mesh)));
-  // From here on the folder's pictures are this room's.
+  // Pictures in the folder now belong to this room.
   ANCHORSPLAT_RETURN_IF_ERROR(WriteWholeFile(note, text, true));
   std::optional<StopSignal> stop_signal(std::in_place);
   const auto cost = WriteViews(tracer, folder, cameras, flags.views, keep);
@@ -122,8 +121,14 @@ void AddDatasetRoom(CLI::App& parent, Program& program) {
   verb.add_option("furniture", flags->furniture, "Text file with mesh, x, y, z, turn and height per line")
       ->required()
       ->check(NotEmpty());
-  verb.add_option("--objects", flags->objects, "Folder of the meshes")->required()->check(NotEmpty());
-  verb.add_option("-o,--output", flags->output, "Folder for the views")->required()->check(NotEmpty());
+  verb.add_option("--objects", flags->objects, "Folder of the meshes")
+      ->type_name("FOLDER")
+      ->required()
+      ->check(NotEmpty());
+  verb.add_option("-o,--output", flags->output, "Folder for the views")
+      ->type_name("FOLDER")
+      ->required()
+      ->check(NotEmpty());
   verb.add_option("--views", flags->count, "Cameras in the room")->check(CLI::Range(1, 10000))->capture_default_str();
   verb.add_option("--size", flags->views.high_size, "Width of the high-resolution views; a multiple of 4")
       ->check(CLI::Range(4, 16384))

@@ -65,7 +65,7 @@ Result<std::vector<EvalMethod>> MakeMethods(const EvalFlags& flags) {
   return methods;
 }
 
-// The f for all objects alike, from the mean PSNR at each of the tried ones. Rows stand in the order of the strengths.
+// The best f over all objects, by mean PSNR at each strength. Rows are in the order of the strengths.
 Result<double> ChooseStrength(const std::vector<MethodSummary>& summaries) {
   const std::span<const double> strengths = FilterStrengths();
   std::vector<double> psnr;
@@ -93,7 +93,7 @@ Status RunEval(EvalFlags flags, Program& program) {
   options.lpips = lpips ? &*lpips : nullptr;
   if (flags.recipe == EvalRecipe::kReal) {
     if (!flags.split.empty())
-      return Error{ErrorCode::kBadArgument, "--split has no effect on captures; select some with --objects"};
+      return Error{ErrorCode::kBadArgument, "--split has no effect on captures; select them with --objects"};
     options.captures.emplace();
     options.captures->seed = shared.seed;
     options.captures->steps = flags.fit_steps.value_or(options.captures->steps);
@@ -154,6 +154,7 @@ void AddEval(CLI::App& app, Program& program) {
       ->check(NotEmpty());
   verb.add_option("-o,--output", flags->out,
                   "Folder for tables and results; existing results are kept (-w: measured again)")
+      ->type_name("FOLDER")
       ->required()
       ->check(NotEmpty());
   AddChoice(
@@ -165,6 +166,7 @@ void AddEval(CLI::App& app, Program& program) {
                       "files (also upscalers), auto, fast, good, best, methods of enhance (refine@k=1@steps=400: "
                       "with options; model-auto: without cameras) (default: raw,upsample,filter; "
                       "with --recipe real also model,auto,good,best)")
+          ->type_name("LIST")
           ->delimiter(',');
   AddChoice(verb, "--protocol", flags->protocol, {{"heldout", Protocol::kHeldOut}, {"upstream", Protocol::kUpstream}},
             "heldout: views that no fit has seen; upstream: as the published evaluation");
@@ -178,10 +180,13 @@ void AddEval(CLI::App& app, Program& program) {
   verb.add_option("--fit-steps", flags->fit_steps,
                   "Fit steps of 'bicubic' (default: 15000) and of --recipe real (default: 5000)")
       ->check(CLI::Range(int64_t{1}, int64_t{1'000'000}));
-  verb.add_option("--split", flags->split, "Only objects of this split: train, validation or test");
-  verb.add_option("--objects", flags->objects, "Only these objects, comma-separated")->delimiter(',');
+  verb.add_option("--split", flags->split, "Only objects of this split: train, validation or test")->type_name("NAME");
+  verb.add_option("--objects", flags->objects, "Only these objects, comma-separated")
+      ->type_name("NAMES")
+      ->delimiter(',');
   verb.add_option("--kinds", flags->kinds,
                   "Only objects of these kinds (entries of the data set's recipe), comma-separated")
+      ->type_name("NAMES")
       ->delimiter(',');
   verb.add_option("--max-views", flags->max_views, "Most views per object; 0: all")
       ->check(NotNegative())

@@ -24,7 +24,7 @@ namespace anchorsplat {
 
 namespace {
 
-// A mesh and what was found, without its triangles: a library's meshes together are gigabytes.
+// Findings of a mesh, without its triangles: those of a library would take gigabytes.
 struct MeshFindings {
   std::string address;
   MeshOrigin origin;
@@ -106,7 +106,7 @@ void PrintMeshTable(const MeshFindings& f) {
   line("object    ", Printable(f.origin.name, 200));
   line("category  ", Printable(f.origin.category, 200));
   line("creator   ", Printable(f.origin.creator, 200));
-  line("licence   ", f.origin.licence.empty() ? "not said" : Printable(f.origin.licence, 200));
+  line("licence   ", f.origin.licence.empty() ? "not stated" : Printable(f.origin.licence, 200));
   line("triangles ", Cat(WithThousands(s.triangles), ", vertices ", WithThousands(s.vertices), ", normals ",
                          f.has_normals ? "of the file" : "made from the triangles"));
   line("materials ", Cat(s.materials, ", textures ", s.textures, ", colours without texture ", s.colors));
@@ -173,7 +173,7 @@ Status RunLibraryInfo(const std::string& path, const SharedFlags& shared) {
   return {};
 }
 
-// The beginning of a file, where a PLY has its header and a glTF its list of extensions, as a rule.
+// Start of a file, which usually has the header of a PLY or the extensions of a glTF.
 std::string Beginning(const std::string& path) {
   if (!IsFile(path)) return {};
   const auto in = InputFile::Open(path);
@@ -188,7 +188,7 @@ bool LooksLikeMesh(const std::string& address) {
   const std::string ending = std::filesystem::path(address).extension().string();
   const std::string beginning = Beginning(address);
   const auto contains = [&](const char* words) { return beginning.find(words) != std::string::npos; };
-  // By content first, as splats are: a splat may have faces beside it, and any name.
+  // By content first: a splat may have faces and any name.
   const SplatFormat* const format = FormatOfFile(beginning, {});
   if (format == nullptr) return ending != ".ply" && ending != ".glb" && ending != ".gltf";
   if (format->name == "PLY") return contains("element face") && !ExtentOf(address);

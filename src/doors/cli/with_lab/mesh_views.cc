@@ -103,7 +103,7 @@ void ViewSetFlags::AddTo(CLI::App& verb) {
   verb.add_option("--points", views.points, "Surface samples to start a fit from")
       ->check(CLI::Range(0, 10'000'000))
       ->capture_default_str();
-  verb.add_option("--background", background, "R,G,B from 0 to 1 (default: black)");
+  verb.add_option("--background", background, "R,G,B from 0 to 1 (default: black)")->type_name("R,G,B");
   verb.add_flag("--opaque", views.opaque, "Write RGB over the background instead of RGBA");
   AddChoice<bool>(verb, "--hr", views.store_high, {{"stored", true}, {"on-demand", false}},
                   "Whether to write the high-resolution pictures");
@@ -125,7 +125,10 @@ void AddViews(CLI::App& app, Program& program) {
               "anchorsplat views chair.obj -o chair/ --views 146 --size 1024 --low-size 256");
   const auto flags = std::make_shared<ViewsFlags>();
   verb.add_option("mesh", flags->mesh, "Mesh file, or catalog.sh3f#object")->required()->check(NotEmpty());
-  verb.add_option("-o,--output", flags->output, "Folder for the views")->required()->check(NotEmpty());
+  verb.add_option("-o,--output", flags->output, "Folder for the views")
+      ->type_name("FOLDER")
+      ->required()
+      ->check(NotEmpty());
   flags->views.AddTo(verb);
   ShortenHelp(verb, {"--output", "--views", "--size", "--low-size", "--rig", "--background", "--opaque", "--overwrite",
                      "--quiet", "--json"});

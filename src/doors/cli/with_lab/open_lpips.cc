@@ -16,7 +16,7 @@ Result<std::optional<Lpips>> OpenLpips(const std::string& net, const std::string
   if (!known) return std::optional<Lpips>();
   const auto missing = [&](const Error& error) -> Result<std::optional<Lpips>> {
     if (error.code != ErrorCode::kNotFound) return error;
-    if (!if_there) return Error{error.code, Cat(error.message, "; --lpips if-there goes on without")};
+    if (!if_there) return Error{error.code, Cat(error.message, "; --lpips if-there continues without it")};
     LogWarning(error.message);
     return std::optional<Lpips>();
   };

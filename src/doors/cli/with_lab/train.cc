@@ -28,8 +28,8 @@ struct TrainFlags {
   std::string captures, config, out, cache, start;
 };
 
-// The program that brings LibTorch along: loading it takes half a second, so the others do without. It is this program
-// with the training in it, and takes the same words.
+// The program linked with LibTorch, with the same command line. It is separate because loading LibTorch takes half a
+// second.
 Status RunInTrainingProgram(const std::vector<std::string>& words) {
   const fs::path program = CompanionFile("anchorsplat-train");
   if (!Exists(program)) {
@@ -40,7 +40,7 @@ Status RunInTrainingProgram(const std::vector<std::string>& words) {
   for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
   execv(program.c_str(), arguments.data());
-  return Error{ErrorCode::kIo, Cat(program.string(), ": cannot be run")};
+  return Error{ErrorCode::kIo, Cat(program.string(), ": cannot be started")};
 }
 
 nlohmann::json ToJson(const std::optional<TrainQuality>& quality) {
@@ -97,7 +97,7 @@ Status RunTrain(TrainFlags& flags, const Program& program) {
   if (!report.ok()) return report.error();
   if (report->interrupted) {
     return Error{ErrorCode::kInterrupted, Cat("stopped after step ", WithThousands(report->steps), "; ",
-                                              report->file.string(), " is saved, --resume continues")};
+                                              report->file.string(), " is saved; continue with --resume")};
   }
   if (program.flags.json) {
     PrintJson(ToJson(*report));
@@ -118,19 +118,26 @@ void AddTrain(CLI::App& app, Program& program) {
       ->check(NotEmpty());
   verb.add_option("--captures", flags->captures,
                   "Folder of captures to train on as well: a splat is fitted to most views, the others are the truth")
+      ->type_name("FOLDER")
       ->check(CLI::ExistingDirectory);
   verb.add_option("--config", flags->config, "Training recipe, a TOML file (docs/training.md)")
+      ->type_name("FILE")
       ->required()
       ->check(CLI::ExistingFile);
   verb.add_option("-o,--output,--out", flags->out, "Folder for the network, its log and its checkpoint")
+      ->type_name("FOLDER")
       ->required()
       ->check(NotEmpty());
   verb.add_option("--validation", flags->validation,
-                  "Data sets to validate on, or their split \"validation\" (default: that split of the training data)");
-  verb.add_option("--split", request.split, "Train on this split (default: \"train\" if there are splits, else all)");
+                  "Data sets to validate on, or their split \"validation\" (default: that split of the training data)")
+      ->type_name("FOLDER");
+  verb.add_option("--split", request.split, "Train on this split (default: \"train\" if there are splits, else all)")
+      ->type_name("NAME");
   verb.add_option("--cache", flags->cache,
-                  "Folder of ground-truth pictures that trainings can share (default: OUT/cache)");
+                  "Folder of ground-truth pictures that trainings can share (default: OUT/cache)")
+      ->type_name("FOLDER");
   verb.add_option("--start", flags->start, "Start from the weights of another training, its checkpoint.safetensors")
+      ->type_name("FILE")
       ->check(CLI::ExistingFile);
   verb.add_flag("--resume", request.resume, "Continue the training in the output folder");
   verb.add_option("--steps", request.steps, "Total steps (default: from the recipe)")

@@ -13,9 +13,9 @@ namespace {
 constexpr const char* kWithout = "this program was built without the lab";
 constexpr const char* kCommand = "make build in a checkout of the sources";
 
-// Whatever words follow: there is nothing that could say which of them are wrong.
+// Accepts any words: their options are not declared here.
 void AddMissingVerb(CLI::App& app, Program& program, const std::string& name) {
-  CLI::App& verb = AddVerb(app, program, name, Cat("Not here: ", kWithout), "anchorsplat doctor");
+  CLI::App& verb = AddVerb(app, program, name, Cat("Not available: ", kWithout), "anchorsplat doctor");
   verb.allow_extras();
   verb.callback([&program, name] {
     program.run = [name]() -> Status {
@@ -35,14 +35,14 @@ void AddBench(CLI::App& app, Program& program) { AddMissingVerb(app, program, "b
 bool LooksLikeMesh(const std::string&) { return false; }
 
 Status RunMeshInfo(const std::string& address, const SharedFlags&) {
-  return Error{ErrorCode::kNotFound, Cat(address, ": meshes are not read: ", kWithout)};
+  return Error{ErrorCode::kNotFound, Cat(address, ": cannot read meshes: ", kWithout)};
 }
 
 Result<PictureDistance> OpenLpipsDistance(const std::string& net, const std::string&) {
   if (net.empty()) return PictureDistance();
   const std::string missing = Cat("LPIPS missing: ", kWithout);
   if (net != kLpipsIfThere) {
-    return Error{ErrorCode::kNotFound, Cat(missing, "; --lpips if-there goes on without")};
+    return Error{ErrorCode::kNotFound, Cat(missing, "; --lpips if-there continues without it")};
   }
   LogWarning(missing);
   return PictureDistance();

@@ -45,7 +45,7 @@ struct Rows {
 };
 
 Error BadHeader(const InputFile& file, const std::string& what) {
-  return {ErrorCode::kBadFile, Cat(file.name(), ": is no complete compressed PLY: ", what)};
+  return {ErrorCode::kBadFile, Cat(file.name(), ": is not a complete compressed PLY: ", what)};
 }
 
 // Byte of property `name` in a row, which must be of `type`.
@@ -91,8 +91,9 @@ Result<int> HarmonicsDegree(const InputFile& file, const PlyElement* sh) {
 }
 
 Error WrongRange(const InputFile& file, int64_t chunk, size_t k, float min, float max) {
-  return {ErrorCode::kBadFile, Cat(file.name(), ": chunk ", WithThousands(chunk), " has ", kChunkProperties[k], " ",
-                                   min, " and ", kChunkProperties[k + 3], " ", max, ": a range the wrong way round")};
+  return {ErrorCode::kBadFile,
+          Cat(file.name(), ": chunk ", WithThousands(chunk), " has ", kChunkProperties[k], " ", min, " and ",
+              kChunkProperties[k + 3], " ", max, ": the minimum is above the maximum")};
 }
 
 Result<std::vector<ChunkRanges>> ReadChunks(const InputFile& file, const Rows& rows) {
@@ -319,7 +320,7 @@ Result<FormatFacts> DescribeCompressedPly(const InputFile& file) {
       others += Cat(others.empty() ? "" : ", ", element.name, ".", property.name);
     }
   }
-  if (!others.empty()) facts.Add("other properties, not read", Printable(others, 200));
+  if (!others.empty()) facts.Add("other properties, ignored", Printable(others, 200));
   const PlyElement* harmonics = header.Find("sh");
   facts.Add("harmonics", harmonics == nullptr ? "none" : Cat(harmonics->properties.size(), " bytes per Gaussian"));
   return facts;

@@ -326,7 +326,7 @@ std::string CompressedPlyMeanLoss(const CloudView& cloud) {
   if (coarse == 0) return {};
   return Cat("positions of ", WithThousands(coarse), " of ", WithThousands(cloud.size()),
              " Gaussians are rounded to steps of up to ", largest / 2047, ", as their chunks of ", kChunk,
-             " reach so far, while 98 % lie within a box of ", middle.extent, " (a PLY keeps them)");
+             " span so much space; 98 % lie within a box of ", middle.extent, " (a PLY keeps them)");
 }
 
 }  // namespace anchorsplat

@@ -101,7 +101,7 @@ Result<Motion> MotionOf(const JsonValue& node, const Motion& outer) {
   if (const std::optional<JsonValue> matrix = node.Find("matrix")) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> m, matrix->Numbers(16));  // column-major
     if (m[3] != 0 || m[7] != 0 || m[11] != 0 || m[15] != 1) {
-      return matrix->Complain("has a last row other than 0 0 0 1, which no node may have");
+      return matrix->Complain("has a last row other than 0 0 0 1");
     }
     for (size_t r = 0; r < 3; ++r) {
       for (size_t c = 0; c < 3; ++c) own.matrix[3 * r + c] = m[4 * c + r];
@@ -114,7 +114,7 @@ Result<Motion> MotionOf(const JsonValue& node, const Motion& outer) {
   }
   if (const std::optional<JsonValue> rotation = node.Find("rotation")) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> q, rotation->Numbers(4));  // xyzw
-    if (!(std::hypot(q[0], q[1], std::hypot(q[2], q[3])) > 0)) return rotation->Complain("is zero: no rotation");
+    if (!(std::hypot(q[0], q[1], std::hypot(q[2], q[3])) > 0)) return rotation->Complain("is zero, not a rotation");
     own.matrix = Product(own.matrix, RotationFromQuaternion(q[3], q[0], q[1], q[2]));
   }
   if (const std::optional<JsonValue> scale = node.Find("scale")) {
@@ -148,13 +148,14 @@ Result<GltfDocument> GltfDocument::Open(const InputFile& file) {
     json_begin = sizeof words;
     json_size = words[3];
     if (file.size() < json_begin || words[1] != 2 || words[4] != 0x4e4f534a || json_size > file.size() - json_begin) {
-      return Error{ErrorCode::kBadFile,
-                   Cat(file.name(), ": byte 4: is no GLB file of version 2 with a JSON chunk of ", words[3], " bytes")};
+      return Error{
+          ErrorCode::kBadFile,
+          Cat(file.name(), ": byte 4: is not a GLB file of version 2 with a JSON chunk of ", words[3], " bytes")};
     }
     if (words[2] != file.size()) {
       return Error{ErrorCode::kBadFile,
-                   Cat(file.name(), ": byte 8: says that the file has ", words[2], " bytes, it has ", file.size(),
-                       ": was it cut, or something put behind it?")};
+                   Cat(file.name(), ": byte 8: the header says ", words[2], " bytes, but the file has ", file.size(),
+                       ": it was truncated or extended")};
     }
     const uint64_t chunk = json_begin + json_size;
     if (file.size() - chunk >= 8) {
@@ -165,14 +166,14 @@ Result<GltfDocument> GltfDocument::Open(const InputFile& file) {
         binary_size = binary[0];
         if (binary_size > file.size() - binary_begin) {
           return Error{ErrorCode::kBadFile, Cat(file.name(), ": byte ", chunk, ": a binary chunk of ", binary[0],
-                                                " bytes, but there are ", file.size() - binary_begin)};
+                                                " bytes, but only ", file.size() - binary_begin, " are left")};
         }
       }
     }
   }
   if (json_size > kMaxJson) {
-    return Error{ErrorCode::kBadFile, Cat(file.name(), ": has JSON of ", HumanBytes(json_size), ", at most ",
-                                          HumanBytes(kMaxJson), " expected")};
+    return Error{ErrorCode::kBadFile, Cat(file.name(), ": has ", HumanBytes(json_size),
+                                          " of JSON, more than the limit of ", HumanBytes(kMaxJson))};
   }
   std::string text(static_cast<size_t>(json_size), '\0');
   ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(json_begin, text.data(), text.size()));
@@ -244,12 +245,12 @@ Result<GltfDocument::Accessor> GltfDocument::FindAccessor(const JsonValue& index
   ANCHORSPLAT_ASSIGN_OR_RETURN(accessor.component_type, component.WholeNumber(5120, 5126));
   const std::optional<JsonValue> normalized = value.Find("normalized");
   accessor.normalized = normalized && normalized->raw().is_boolean() && normalized->raw().get<bool>();
-  if (value.has("sparse")) return value.Complain("is sparse, which is not read");
+  if (value.has("sparse")) return value.Complain("is sparse, which is not supported");
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue view_index, value.Get("bufferView"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue view, Element("bufferViews", view_index));
   if (const std::optional<JsonValue> extensions = view.Find("extensions");
       extensions && extensions->raw().is_object() && !extensions->raw().empty()) {
-    return extensions->Complain(Cat("uses ", Printable(extensions->raw().begin().key()), ", which is not read"));
+    return extensions->Complain(Cat("uses ", Printable(extensions->raw().begin().key()), ", which is not supported"));
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue buffer_index, view.Get("buffer"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const int at, buffer_index.WholeNumber(0, kMost));
@@ -288,8 +289,8 @@ Result<std::vector<char>> GltfDocument::RootsOfScene(size_t nodes, const std::ve
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> indices, list->Elements());
   for (const JsonValue& index : indices) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const int at, index.WholeNumber(0, kMost));
-    if (static_cast<size_t>(at) >= nodes) return index.Complain("is no node");
-    if (is_child[static_cast<size_t>(at)] != 0) return index.Complain("is a child of another node, no root");
+    if (static_cast<size_t>(at) >= nodes) return index.Complain("is not a node");
+    if (is_child[static_cast<size_t>(at)] != 0) return index.Complain("is a child of another node, not a root");
     roots[static_cast<size_t>(at)] = 1;
   }
   return roots;
@@ -327,7 +328,7 @@ Result<std::vector<GltfDocument::Placed>> GltfDocument::PlacedMeshes() const {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> indices, value->Elements());
     for (const JsonValue& index : indices) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(const int at, index.WholeNumber(0, kMost));
-      if (static_cast<size_t>(at) >= nodes.size()) return index.Complain("is no node");
+      if (static_cast<size_t>(at) >= nodes.size()) return index.Complain("is not a node");
       children.push_back(static_cast<size_t>(at));
     }
     return children;

@@ -71,7 +71,7 @@ Result<bool> HoldsLogarithms(const JsonValue& attribute, const Accessor& scales)
   if (spread.forbidden == 0) return false;
   if (IsMeant(spread)) return true;
   return attribute.Complain(Cat("has ", Some(spread), " below 0 (down to ", spread.min,
-                                "), which lengths may not have, and too few for logarithms: the file is damaged"));
+                                "): too many for lengths, too few for logarithms; the file is damaged"));
 }
 
 Result<bool> HoldsLogits(const JsonValue& attribute, const Accessor& opacities) {
@@ -80,7 +80,7 @@ Result<bool> HoldsLogits(const JsonValue& attribute, const Accessor& opacities) 
   if (spread.forbidden == 0) return false;
   if (IsMeant(spread) && (spread.min < -kLeastOutside || spread.max <= kMostPositiveLogit)) return true;
   return attribute.Complain(Cat("has ", Some(spread), " outside of 0 to 1 (from ", spread.min, " to ", spread.max,
-                                "), which ", "KHR_gaussian_splatting forbids, and that are no logits either"));
+                                "): neither opacities as in KHR_gaussian_splatting, nor logits"));
 }
 
 }  // namespace anchorsplat

@@ -68,7 +68,7 @@ Result<GltfPrimitive> OpenPrimitive(const GltfDocument& document, const JsonValu
   }
   const std::optional<JsonValue> inner = extension.Find("extensions");
   if (inner && inner->raw().is_object() && !inner->raw().empty()) {
-    return inner->Complain(Cat("uses ", Printable(inner->raw().begin().key()), ", which is not read"));
+    return inner->Complain(Cat("uses ", Printable(inner->raw().begin().key()), ", which is not supported"));
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue attributes, value.Get("attributes"));
   const auto name = [](const char* what) { return Cat(kGltfSplatting, ":", what); };
@@ -81,7 +81,8 @@ Result<GltfPrimitive> OpenPrimitive(const GltfDocument& document, const JsonValu
   ANCHORSPLAT_ASSIGN_OR_RETURN(primitive.scales, Attribute(document, attributes, kScale, 3, true));
   ANCHORSPLAT_ASSIGN_OR_RETURN(primitive.opacities, Attribute(document, attributes, kOpacity, 1, true));
   if (primitive.opacities.component_type != kGltfFloat && !primitive.opacities.normalized) {
-    return attributes.Find(kOpacity)->Complain("refers to whole numbers that are not normalized: opacities are 0 to 1");
+    return attributes.Find(kOpacity)->Complain(
+        "refers to integers that are not normalized; expected opacities from 0 to 1");
   }
   for (int degree = 0; degree <= kMaxShDegree; ++degree) {
     if (degree > 0 && !attributes.has(name(Cat("SH_DEGREE_", degree, "_COEF_0").c_str()).c_str())) break;
@@ -152,7 +153,7 @@ Status CheckRequired(const GltfDocument& document) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string name, value.Text());
     const auto begins = [&name](std::string_view known) { return name.starts_with(known); };
     if (std::ranges::none_of(kHarmless, begins)) {
-      return value.Complain(Cat("is ", Printable(name), ", which this version does not know"));
+      return value.Complain(Cat("is ", Printable(name), ", which is not supported"));
     }
   }
   return {};
@@ -164,7 +165,7 @@ Status CheckNode(const GltfDocument::Placed& placed) {
   if (!extensions || !extensions->raw().is_object()) return {};
   for (const char* name : {"EXT_mesh_gpu_instancing", "EXT_instance_features"}) {
     if (extensions->has(name)) {
-      return extensions->Complain(Cat("uses ", name, " for a splat, which is not read: make it nodes"));
+      return extensions->Complain(Cat("uses ", name, " for a splat, which is not supported: replace it with nodes"));
     }
   }
   return {};
@@ -178,7 +179,7 @@ std::string OtherSplatExtension(const GltfDocument& document) {
     for (const nlohmann::json& name : list->raw()) {
       if (!name.is_string() || name == kGltfSplatting) continue;
       const auto& text = name.get_ref<const std::string&>();
-      if (text.find("splat") != text.npos) return Cat("; it uses ", Printable(text), ", which is not read");
+      if (text.find("splat") != text.npos) return Cat("; it uses ", Printable(text), ", which is not supported");
     }
   }
   return {};
@@ -196,7 +197,7 @@ Status FindMeanings(const JsonValue& attributes, const std::string& where, GltfP
   add(primitive.logarithms, "SCALE has negative values, so it is read as logarithms instead of lengths");
   add(primitive.logits, "OPACITY has values outside of 0 to 1, so it is read as logits instead of opacities");
   add(primitive.linear, LinearColorInWords(primitive.degree));
-  add(primitive.other_sorting, "its sortingMethod is not known: Gaussians are drawn from back to front");
+  add(primitive.other_sorting, "its sortingMethod is unknown, so Gaussians are drawn from back to front");
   return {};
 }
 
@@ -240,9 +241,8 @@ Result<GltfSplats> FindGltfSplats(const InputFile& file, const GltfDocument& doc
     const std::optional<GltfPlace> place = PlaceOf(placed.matrix, placed.translation);
     if (!place) {
       return placed.node.Complain(
-          "stretches or slants a splat, itself or by a node above it: Gaussians can only be moved, turned, mirrored "
-          "and "
-          "scaled alike on all sides");
+          "stretches or shears a splat, directly or through a parent node: Gaussians can only be moved, rotated, "
+          "mirrored and scaled uniformly");
     }
     for (const JsonValue& value : mesh->splats) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(GltfPrimitive primitive, OpenPrimitive(document, value, *SplatExtension(value)));
@@ -254,7 +254,7 @@ Result<GltfSplats> FindGltfSplats(const InputFile& file, const GltfDocument& doc
       splats.primitives.push_back(std::move(primitive));
       attributes.push_back(*value.Find("attributes"));
       if (splats.primitives.size() > kMaxPrimitives) {
-        return placed.mesh.Complain(Cat("shows one of more than ", kMaxPrimitives, " primitives of splats"));
+        return placed.mesh.Complain(Cat("exceeds the limit of ", kMaxPrimitives, " splat primitives"));
       }
     }
   }
@@ -272,9 +272,9 @@ Result<GltfSplats> FindGltfSplats(const InputFile& file, const GltfDocument& doc
   const auto warn = [&](int64_t count, const char* what) {
     if (count > 0) splats.warnings.push_back(Cat(file.name(), ": ", count, count == 1 ? " node" : " nodes", what));
   };
-  warn(hidden, " with splats, hidden or of another scene, not read");
-  warn(animated, " with splats moved by animations: read as they stand");
-  warn(skinned, " with splats bent by skins: read as they stand");
+  warn(hidden, " with splats skipped: hidden, or in another scene");
+  warn(animated, " with animated splats: animation ignored");
+  warn(skinned, " with skinned splats: skin ignored");
   return splats;
 }
 

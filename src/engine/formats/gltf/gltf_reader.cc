@@ -110,11 +110,11 @@ Result<FormatFacts> DescribeGltf(const InputFile& file) {
   const auto any = [&read](bool GltfPrimitive::*what) {
     return std::ranges::any_of(read.primitives, [what](const GltfPrimitive& one) { return one.*what; });
   };
-  facts.Add("scales", any(&GltfPrimitive::logarithms) ? "logarithms, against the extension" : "lengths");
-  facts.Add("opacities", any(&GltfPrimitive::logits) ? "logits, against the extension" : "0 to 1");
+  facts.Add("scales", any(&GltfPrimitive::logarithms) ? "logarithms, contrary to the extension" : "lengths");
+  facts.Add("opacities", any(&GltfPrimitive::logits) ? "logits, contrary to the extension" : "0 to 1");
   facts.Add("placed", InWords(read.primitives.front().place),
             read.primitives.size() > 1 ? " (the first primitive)" : "");
-  facts.Add("primitives", splats, " of Gaussians", others > 0 ? Cat(", ", others, " others that are not read") : "");
+  facts.Add("primitives", splats, " of Gaussians", others > 0 ? Cat(", ", others, " others ignored") : "");
   return facts;
 }
 

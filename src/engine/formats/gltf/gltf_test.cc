@@ -278,7 +278,7 @@ TEST(Gltf, RefusesLiesAndCircles) {
   expect(error_with("/nodes", Json::parse(R"([{"children":[7]}])")), "no node");
   expect(error_with("/nodes/0/rotation", {0, 0, 0, 0}), "is zero");
   expect(error_with("/nodes/0/scale", {0, 0, 0}), "stretches");
-  expect(error_with("/nodes/0/matrix", {1, 0, 0, 0, 0.5, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}), "slants");
+  expect(error_with("/nodes/0/matrix", {1, 0, 0, 0, 0.5, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}), "shears");
   expect(error_with("/nodes/0/matrix", {1, 0, 0, 0.5, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}), "last row");
   expect(error_with("/nodes/0/extensions", {{"EXT_mesh_gpu_instancing", Json::object()}}), "EXT_mesh_gpu_instancing");
   expect(error_with("/extensionsRequired", {"KHR_gaussian_splatting", "EXT_meshopt_compression"}),
@@ -315,9 +315,9 @@ TEST(Gltf, RefusesLiesAndCircles) {
     const auto cloud = Read(changed);
     return cloud.ok() ? std::string("accepted") : cloud.error().message;
   };
-  expect(with_word(8, 0xffffffff), "says that the file has 4294967295 bytes");
-  expect(with_word(8, 100), "says that the file has 100 bytes");
-  expect(Read(bytes + "tail").error().message, "put behind it");
+  expect(with_word(8, 0xffffffff), "the header says 4294967295 bytes");
+  expect(with_word(8, 100), "the header says 100 bytes");
+  expect(Read(bytes + "tail").error().message, "truncated or extended");
   expect(with_word(bytes.size() - good.binary.size() - 8, static_cast<uint32_t>(good.binary.size() + 1)),
          "a binary chunk of");
   for (const size_t size : {size_t{4}, size_t{19}, size_t{100}, bytes.size() - 1}) {

@@ -217,8 +217,8 @@ Status WriteGlb(const std::filesystem::path& path, const CloudView& cloud, const
   const uint64_t binary = BytesOf(attributes, cloud.size());
   const uint64_t begin = kHeads + json.size();
   if (begin + binary > 0xffffffffu) {
-    return Error{ErrorCode::kBadArgument, Cat(path.string(), ": ", WithThousands(cloud.size()), " Gaussians take ",
-                                              HumanBytes(binary), ", a GLB file ends at 4.3 GB")};
+    return Error{ErrorCode::kBadArgument, Cat(path.string(), ": ", WithThousands(cloud.size()), " Gaussians need ",
+                                              HumanBytes(binary), ", but a GLB file holds at most 4.3 GB")};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite, options.memory));
   ANCHORSPLAT_RETURN_IF_ERROR(file.Reserve(begin + binary));

@@ -109,8 +109,8 @@ Result<Part> ReadPart(const InputFile& input, const ReadLimits& limits) {
   const Names* const names = NamesIn(file);
   if (names == nullptr) {
     return bad(
-        "is a PyTorch checkpoint, but neither one of gsplat with Gaussians (no tensor \"means\" in \"splats\") nor one "
-        "of nerfstudio's splatfacto or INRIA's trainer");
+        "is a PyTorch checkpoint, but not of gsplat (no tensor \"means\" in \"splats\"), nerfstudio's splatfacto or "
+        "INRIA's trainer");
   }
   const auto called = [&](const char* name) { return Cat(names->prefix, name); };
   const TensorEntry* const means = file.Find(called(names->means));
@@ -219,7 +219,7 @@ std::set<int> RanksBeside(const InputFile& input, const RankName& own) {
   return ranks;
 }
 
-constexpr const char* kAlone = "; under a name without \"_rank\" a file is read alone";
+constexpr const char* kAlone = "; to read it alone, rename it without \"_rank\"";
 
 std::string NameOf(const RankName& own, int rank) { return Cat(own.before, rank, own.after); }
 
@@ -235,7 +235,7 @@ Result<GaussianCloud> ReadGsplatCheckpoint(const InputFile& input, const ReadLim
   int expected = 0;
   for (const int rank : ranks) {
     if (rank == expected++) continue;
-    return Error{ErrorCode::kBadFile, Cat(input.name(), ": is a part of a splat, of which ", NameOf(*own, expected - 1),
+    return Error{ErrorCode::kBadFile, Cat(input.name(), ": is one part of a splat, but ", NameOf(*own, expected - 1),
                                           " is missing beside it", kAlone)};
   }
   GaussianCloud cloud;
@@ -252,8 +252,8 @@ Result<GaussianCloud> ReadGsplatCheckpoint(const InputFile& input, const ReadLim
     ANCHORSPLAT_ASSIGN_OR_RETURN(Part part, read());
     const auto differ = [&](const char* what, int64_t first, int64_t other) {
       return Error{ErrorCode::kBadFile,
-                   Cat(input.name(), ": is a part of a splat whose parts do not belong together: ", NameOf(*own, 0),
-                       " has ", what, " ", first, " and ", NameOf(*own, rank), " has ", other, kAlone)};
+                   Cat(input.name(), ": the parts of this splat do not match: ", NameOf(*own, 0), " has ", what, " ",
+                       first, " and ", NameOf(*own, rank), " has ", other, kAlone)};
     };
     if (rank == 0) {
       cloud = std::move(part.cloud);
@@ -265,8 +265,8 @@ Result<GaussianCloud> ReadGsplatCheckpoint(const InputFile& input, const ReadLim
     ANCHORSPLAT_RETURN_IF_ERROR(Append(cloud, part.cloud));
     cloud.double_means |= part.cloud.double_means;
   }
-  LogInfo(Cat(input.name(), ": is read with the other parts of its splat, ", ranks.size(), " in all (", NameOf(*own, 0),
-              " to ", NameOf(*own, expected - 1), ")", kAlone));
+  LogInfo(Cat(input.name(), ": reading all ", ranks.size(), " parts of this splat (", NameOf(*own, 0), " to ",
+              NameOf(*own, expected - 1), ")", kAlone));
   return cloud;
 }
 

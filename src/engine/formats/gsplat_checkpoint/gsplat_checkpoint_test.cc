@@ -173,13 +173,15 @@ TEST(GsplatCheckpoint, PartsOfOneSplatAreReadTogether) {
     EXPECT_EQ(all->size(), 15);
     EXPECT_EQ(all->means[15], all->means[0]);
     ASSERT_EQ(messages.notes().size(), 1u);
-    EXPECT_THAT(messages.notes()[0], HasSubstr("3 in all (ckpt_9_rank0.pt to ckpt_9_rank2.pt); under a name without"));
+    EXPECT_THAT(
+        messages.notes()[0],
+        HasSubstr("reading all 3 parts of this splat (ckpt_9_rank0.pt to ckpt_9_rank2.pt); to read it alone, rename"));
   }
   EXPECT_FALSE(CheckNotInput(folder / "ckpt_9_rank1.pt").ok());
   EXPECT_EQ(OpenedSplat::Open(folder / "ckpt_9_rank0.pt")->bytes(), 3 * ReadTestFile("ckpt_degree1.pt").size());
   put("ckpt_9_rank4.pt", 1);
   EXPECT_THAT(ReadCloud(folder / "ckpt_9_rank0.pt").error().message,
-              HasSubstr("is a part of a splat, of which ckpt_9_rank3.pt is missing beside it"));
+              HasSubstr("is one part of a splat, but ckpt_9_rank3.pt is missing beside it"));
   EXPECT_THAT(ReadCloud(folder / "ckpt_8_rank1.pt").error().message, HasSubstr("ckpt_8_rank0.pt is missing"));
   put("ckpt_9_rank3.pt", 3);
   EXPECT_THAT(ReadCloud(folder / "ckpt_9_rank0.pt").error().message,
@@ -263,7 +265,7 @@ TEST(GsplatCheckpoint, MessagesNameTheTensor) {
   EXPECT_THAT(Read(OneGaussian(wide)).error().message, HasSubstr("has shape [1, 9, 3], expected [N, 0, 3], [N, 3, 3]"));
   EXPECT_THAT(Read(ReadTestFile("ckpt_degree1.pt"), {.max_gaussians = 4}).error().message,
               HasSubstr("holds 5 Gaussians, more than the limit of 4"));
-  EXPECT_THAT(Read(ReadTestFile("state_dict.pth")).error().message, HasSubstr("but neither one of gsplat"));
+  EXPECT_THAT(Read(ReadTestFile("state_dict.pth")).error().message, HasSubstr("but not of gsplat"));
 }
 
 TEST(GsplatCheckpoint, AClaimedNumberOfGaussiansIsNotBelieved) {

@@ -102,7 +102,7 @@ Status ReadSectionHeader(const InputFile& file, uint64_t at, uint64_t begin, con
     const bool enough = section.full_buckets + section.partial_buckets <= section.buckets &&
                         (section.bucket_bytes >= 12 || section.buckets == 0);
     if (!enough || !std::isfinite(section.block_size)) {
-      return Bad(file, at + 8, "the section's buckets do not belong together");
+      return Bad(file, at + 8, "the section's bucket sizes are inconsistent");
     }
   }
   return {};
@@ -121,12 +121,13 @@ Result<Ksplat> ReadHeaders(const InputFile& file, const ReadLimits& limits) {
   if (ksplat.level >= kLevels.size())
     return Bad(file, 20, Cat("compression level ", ksplat.level, ", expected 0 to 2"));
   const float min = At<float>(header, 36), max = At<float>(header, 40);
-  if (!std::isfinite(min) || !std::isfinite(max)) return Bad(file, 36, "a range of harmonics that is no number");
+  if (!std::isfinite(min) || !std::isfinite(max)) return Bad(file, 36, "a range of harmonics that is not finite");
   if (min != 0) ksplat.sh_min = min;
   if (max != 0) ksplat.sh_max = max;
   if (ksplat.sh_min > ksplat.sh_max) {
-    return Bad(file, 36,
-               Cat("a range of harmonics from ", ksplat.sh_min, " to ", ksplat.sh_max, ", the wrong way round"));
+    return Bad(
+        file, 36,
+        Cat("a range of harmonics from ", ksplat.sh_min, " to ", ksplat.sh_max, ": the minimum is above the maximum"));
   }
   for (size_t k = 0; k < 3; ++k) ksplat.center[k] = At<float>(header, 24 + 4 * k);
   if (sections > (file.size() - kHeaderBytes) / kSectionHeaderBytes) {
@@ -209,7 +210,7 @@ Result<Buckets> BucketsOf(const InputFile& file, const Ksplat& ksplat, const Sec
 }
 
 Error LostRow(const InputFile& file, const Section& section) {
-  return Bad(file, section.begin, "a Gaussian lies in no bucket of its section");
+  return Bad(file, section.begin, "a Gaussian is in no bucket of its section");
 }
 
 // Unpacks records [first, first + count) of a section into rows of the cloud from `to` on, with as many harmonics as it
@@ -329,7 +330,7 @@ Result<FormatFacts> DescribeKsplat(const InputFile& file) {
   facts.Add("sections", ksplat.sections.size());
   if (ksplat.center != std::array<float, 3>{}) {
     facts.Add("scene centre", ksplat.center[0], " ", ksplat.center[1], " ", ksplat.center[2],
-              ", about which its viewer turns");
+              ", the centre of its viewer's orbit");
   }
   return facts;
 }

@@ -117,12 +117,12 @@ TEST(Ksplat, RefusesLies) {
   expect(error_of(16, uint32_t{4}), "sections have 3");
   expect(error_of(16, uint32_t{0}), "no Gaussians");
   expect(error_of(20, uint16_t{3}), "level 3");
-  expect(error_of(36, std::nanf("")), "no number");
-  expect(error_of(36, 3.0f), "wrong way round");
+  expect(error_of(36, std::nanf("")), "not finite");
+  expect(error_of(36, 3.0f), "above the maximum");
   expect(error_of(4096, uint32_t{4}), "section of 4");
   expect(error_of(4096 + 4, uint32_t{0xffffffff}), "would end");
   expect(error_of(4096 + 12, uint32_t{0xffffffff}), "would end");
-  expect(error_of(4096 + 32, uint32_t{7}), "do not belong together");
+  expect(error_of(4096 + 32, uint32_t{7}), "bucket sizes are inconsistent");
   expect(error_of(4096 + 40, uint16_t{4}), "SH degree 4");
   expect(error_of(4096 + 36, uint32_t{0}), "in no bucket");
   expect(error_of(4096 + 1024, uint32_t{0}), "accepted");  // the last bucket's size hardly matters

@@ -29,7 +29,7 @@ void FindFullColor(const InputFile& file, const GaussianCloud& rows, PlyLayout& 
   if (layout.float_color) layout.full_color = FullIntensityOf(rows.sh);  // degree 0, as there is no f_rest
   if (extras != nullptr) extras->full_color = layout.full_color;
   if (!layout.float_color || layout.full_color == 1) return;
-  LogInfo(Cat(file.name(), ": its red green blue are floats that go beyond 1 and are read as colours from 0 to ",
+  LogInfo(Cat(file.name(), ": its red green blue are floats above 1, so they are read as colours from 0 to ",
               std::lround(layout.full_color), "; convert --colors 0-1 reads them as they are"));
 }
 

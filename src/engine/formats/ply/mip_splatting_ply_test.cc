@@ -127,9 +127,8 @@ TEST(RenderModeTag, OneThatIsNotKnownIsAWarning) {
     const auto names = [](const char* tag, const char* mode) {
       return ElementsAre(AllOf(HasSubstr("a."), HasSubstr(tag), HasSubstr(mode), HasSubstr("--mode")));
     };
-    EXPECT_THAT(warnings({"SplatRenderMode: 2dgs"}), names("\"SplatRenderMode: 2dgs\"", "mode classic is assumed"));
-    EXPECT_THAT(warnings({"SplatRenderMode: mip", "SplatRenderDilation: wide"}),
-                names("wide", "mode antialiased is assumed"));
+    EXPECT_THAT(warnings({"SplatRenderMode: 2dgs"}), names("\"SplatRenderMode: 2dgs\"", "assuming classic"));
+    EXPECT_THAT(warnings({"SplatRenderMode: mip", "SplatRenderDilation: wide"}), names("wide", "assuming antialiased"));
     EXPECT_THAT(warnings({"antialiased yes", "antialiased 2"}), names("(and 1 more)", "classic"));
     EXPECT_THAT(warnings({"SplatRenderMode: mip", "SplatRenderDilation: 0.1", "antialiased rendering of a mug",
                           "antialiased", "made by a test"}),

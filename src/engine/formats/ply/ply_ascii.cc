@@ -236,8 +236,8 @@ Status ReadAsciiBody(const InputFile& file, const PlyHeader& header, const PlyEl
   if (&header.elements.back() != &vertex) return {};
   ANCHORSPLAT_ASSIGN_OR_RETURN(const int64_t surplus, reader.NextLine());
   if (surplus > 0) {
-    LogWarning(Cat(file.name(), ": line ", WithThousands(surplus), ": what is behind its ", WithThousands(vertex.count),
-                   " Gaussians is not read: its header knows nothing of it"));
+    LogWarning(Cat(file.name(), ": line ", WithThousands(surplus), ": ignoring what follows its ",
+                   WithThousands(vertex.count), " Gaussians, as the header does not mention it"));
   }
   return {};
 }

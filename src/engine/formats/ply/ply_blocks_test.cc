@@ -74,7 +74,7 @@ TEST(PlyBlocks, BytesThatNobodyReadsAreSaid) {
   EXPECT_THAT(warnings(""), testing::IsEmpty());
   EXPECT_THAT(warnings("\r\n"), testing::IsEmpty());
   EXPECT_THAT(warnings(std::string(1000, 'x')),
-              testing::ElementsAre(testing::HasSubstr("the 1,000 bytes behind its 30 Gaussians are not read")));
+              testing::ElementsAre(testing::HasSubstr("ignoring 1,000 bytes after its 30 Gaussians")));
 }
 
 // Mip-Splatting's filter, and a property that is no float.

@@ -49,8 +49,8 @@ void WarnOfSurplus(const InputFile& file, const PlyHeader& header, const PlyElem
     end += static_cast<uint64_t>(element.count) * element.row_size();
   }
   if (file.size() <= end + kLineEnd) return;
-  LogWarning(Cat(file.name(), ": byte ", Thousands(end), ": the ", Thousands(file.size() - end), " bytes behind its ",
-                 WithThousands(vertex.count), " Gaussians are not read: its header knows nothing of them"));
+  LogWarning(Cat(file.name(), ": byte ", Thousands(end), ": ignoring ", Thousands(file.size() - end),
+                 " bytes after its ", WithThousands(vertex.count), " Gaussians, as the header does not mention them"));
 }
 
 Status CheckGaussianLimit(const InputFile& file, const PlyElement& vertex, const ReadLimits& limits) {

@@ -67,15 +67,15 @@ Result<bool> HasLinearColors(const InputFile& file, const PlyHeader& header) {
     uint64_t at = header.body;
     for (const PlyElement& other : header.elements) {
       if (&other == element) break;
-      if (other.has_lists()) return bad("lies behind lists, where it is not looked for");
+      if (other.has_lists()) return bad("comes after lists, where it cannot be read");
       if (static_cast<uint64_t>(other.count) > file.size() / std::max<uint64_t>(1, other.row_size())) {
-        return bad("lies behind the end of the file");
+        return bad("lies beyond the end of the file");
       }
       at += static_cast<uint64_t>(other.count) * other.row_size();
     }
     ANCHORSPLAT_ASSIGN_OR_RETURN(value, ByteAt(file, header, element->properties[0], at));
   }
-  if (value != 0 && value != 1) return bad("is a number that this version does not know (0 is sRGB, 1 linear RGB)");
+  if (value != 0 && value != 1) return bad("is unknown (0 is sRGB, 1 linear RGB)");
   return value == 1;
 }
 

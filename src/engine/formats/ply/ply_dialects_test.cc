@@ -123,8 +123,7 @@ TEST(PlyDialects, CloudCompareNames) {
     EXPECT_CONTAINS(FactsOf(bytes)["names"], "CloudCompare");
     EXPECT_EQ(FactsOf(bytes)["other properties"], prefix + "label");
     columns.push_back({"float", "opacity", [](int64_t) { return 1.0; }});
-    EXPECT_CONTAINS(ErrorOf(columns),
-                    "property \"opacity\" and \"" + prefix + "opacity\" would both be the \"opacity\"");
+    EXPECT_CONTAINS(ErrorOf(columns), "property \"opacity\" and \"" + prefix + "opacity\" both map to \"opacity\"");
   }
   EXPECT_FALSE(FactsOf(PlyOf(ColumnsOf(cloud), 3)).contains("names"));
 }

@@ -21,8 +21,8 @@ Status FuseFilter(const InputFile& file, std::span<const float> sizes, int64_t f
 }
 
 void ReportFusedFilter(const InputFile& file, RenderMode mode) {
-  LogInfo(Cat(file.name(), ": Mip-Splatting's 3-D filter (", kFilter3d,
-              ") is made a part of scales and opacities; the render mode is ", NameOf(mode)));
+  LogInfo(Cat(file.name(), ": applied Mip-Splatting's 3-D filter (", kFilter3d,
+              ") to scales and opacities; the render mode is ", NameOf(mode)));
 }
 
 }  // namespace anchorsplat

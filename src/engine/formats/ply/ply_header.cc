@@ -75,7 +75,7 @@ Status HeaderParser::Line(std::string_view line) {
   std::string_view rest = line;
   const std::string_view keyword = TakeWord(rest);
   if (header_.lines == 1) {
-    if (keyword != "ply" || !rest.empty()) return Unexpected("\"ply\" (this is no PLY file)", line);
+    if (keyword != "ply" || !rest.empty()) return Unexpected("\"ply\" (this is not a PLY file)", line);
     return {};
   }
   // other obj_info is dropped
@@ -162,7 +162,7 @@ Status HeaderParser::Comment(std::string_view rest) {
   if (const std::optional<WorldOrigin> origin = OriginOfComment(rest)) {
     header_.origin = *origin;
   } else if (IsOriginComment(rest)) {
-    return Bad(Cat("\"", Printable(std::string(rest)), "\" gives no origin of the positions: expected three numbers"));
+    return Bad(Cat("\"", Printable(std::string(rest)), "\" is not an origin of the positions: expected three numbers"));
   } else if (!mode_.Take(rest)) {
     header_.comments.emplace_back(rest);
     if (LooksLikeModeTag(rest)) header_.unknown_mode_tags.emplace_back(rest);
@@ -227,10 +227,10 @@ void WarnOfUnknownModeTags(const InputFile& file, const PlyHeader& header) {
   const int64_t more = std::ssize(header.unknown_mode_tags) - 1;
   LogWarning(Cat(file.name(), ": comment \"", Printable(header.unknown_mode_tags.front()), "\"",
                  more > 0 ? Cat(" (and ", more, " more)") : "",
-                 " says no render mode that this version knows (SplatRenderMode: default or mip, SplatRenderDilation: "
-                 "0.1 or 0.3, antialiased 0 or 1): the mode ",
+                 " has no known render mode (SplatRenderMode: default or mip, SplatRenderDilation: "
+                 "0.1 or 0.3, antialiased 0 or 1): assuming ",
                  NameOf(header.render_mode.value_or(RenderMode::kClassic)),
-                 " is assumed; --mode says another, where a verb has it"));
+                 "; pass --mode for another, to verbs that have it"));
 }
 
 Result<PlyHeader> ReadPlyHeader(const InputFile& file) {
@@ -243,7 +243,7 @@ Result<PlyHeader> ReadPlyHeader(const InputFile& file) {
   for (const size_t piece : {size_t{16} << 10, kMaxPlyHeader}) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(bytes, file.Head(piece));
     if (!bytes.starts_with("ply")) {
-      return Error{ErrorCode::kBadFile, Cat(file.name(), ": byte 0: is no PLY file: expected \"ply\", found \"",
+      return Error{ErrorCode::kBadFile, Cat(file.name(), ": byte 0: is not a PLY file: expected \"ply\", found \"",
                                             Printable(bytes.substr(0, 8)), "\"")};
     }
     while (!parser.done()) {

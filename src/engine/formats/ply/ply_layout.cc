@@ -91,8 +91,8 @@ Result<Properties> FindProperties(const InputFile& file, const PlyElement& verte
     const auto [other, fresh] = found.emplace(KnownName(property), p);
     if (fresh) continue;
     return Error{ErrorCode::kBadFile, Cat(Where(file, property.line), "property \"", property.name, "\" and \"",
-                                          vertex.properties[other->second].name, "\" would both be the \"",
-                                          other->first, "\" of the Gaussians: remove one of them")};
+                                          vertex.properties[other->second].name, "\" both map to \"", other->first,
+                                          "\": remove one of them")};
   }
   return found;
 }

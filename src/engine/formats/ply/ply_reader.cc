@@ -82,8 +82,8 @@ Result<CloudExtent> ExtentOfPly(const InputFile& file) {
   const PlyElement& vertex = *layout.vertex;
   const uint64_t row = header.encoding == PlyEncoding::kAscii ? 2 * vertex.properties.size() : vertex.row_size();
   if (static_cast<uint64_t>(vertex.count) > file.size() / std::max<uint64_t>(1, row)) {
-    return Error{ErrorCode::kBadFile, Cat(file.name(), ": line ", vertex.line, ": there are fewer bytes than ",
-                                          WithThousands(vertex.count), " Gaussians take")};
+    return Error{ErrorCode::kBadFile, Cat(file.name(), ": line ", vertex.line, ": the file is too short for ",
+                                          WithThousands(vertex.count), " Gaussians")};
   }
   return CloudExtent{vertex.count, layout.sh_degree};
 }
@@ -107,12 +107,12 @@ Result<FormatFacts> DescribePly(const InputFile& file) {
   if (layout.surfels) facts.Add("surfels", "of 2DGS (two scales), flat along their third axis");
   if (layout.full_color > 0) facts.Add("colours", "red green blue, in place of f_dc_*");
   if (layout.full_alpha > 0) facts.Add("opacities", "alpha, in place of opacity");
-  if (layout.prefixed) facts.Add("names", "behind CloudCompare's \"scalar_\"");
+  if (layout.prefixed) facts.Add("names", "with CloudCompare's prefix \"scalar_\"");
   if (layout.has_degree_4()) facts.Add("harmonics", "degree 4, read as 3");
-  if (layout.filter) facts.Add("3-D filter", "of Mip-Splatting (", kFilter3d, "), made a part of the Gaussians");
+  if (layout.filter) facts.Add("3-D filter", "of Mip-Splatting (", kFilter3d, "), applied to the Gaussians");
   if (header.Find(kColorSpace) != nullptr) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const bool linear, HasLinearColors(file, header));
-    facts.Add("colour space", linear ? "linear RGB, made sRGB" : "sRGB");
+    facts.Add("colour space", linear ? "linear RGB, converted to sRGB" : "sRGB");
   }
   if (!others.empty()) facts.Add("other properties", Printable(others, 200));
   return facts;

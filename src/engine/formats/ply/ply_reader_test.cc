@@ -236,7 +236,7 @@ class PlyErrors : public ::testing::Test {
 
 TEST_F(PlyErrors, Header) {
   EXPECT_ERROR("", "is empty");
-  EXPECT_ERROR("solid mesh", "is no PLY file");
+  EXPECT_ERROR("solid mesh", "is not a PLY file");
   EXPECT_ERROR("plywood\n", "line 1: expected \"ply\"");
   EXPECT_ERROR("ply\nelement vertex 1\nend_header\n", "no \"format\" line");
   EXPECT_ERROR("ply\nformat binary 1.0\n", "line 2: expected ascii, binary_little_endian");
@@ -401,7 +401,7 @@ TEST(PlyReader, RowsThatTheHeaderKnowsNothingOf) {
     ASSERT_TRUE(read.ok()) << read.error().message;
     EXPECT_EQ(read->size(), 2);
     ASSERT_EQ(messages.warnings().size(), 1u) << encoding;
-    EXPECT_NE(messages.warnings()[0].find("behind its 2 Gaussians"), std::string::npos) << messages.warnings()[0];
+    EXPECT_NE(messages.warnings()[0].find("after its 2 Gaussians"), std::string::npos) << messages.warnings()[0];
   }
 }
 

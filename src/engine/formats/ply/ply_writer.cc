@@ -159,8 +159,8 @@ Status WritePlyWithExtras(const std::filesystem::path& path, const CloudView& cl
                           const ExtraProperties& extras) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   if (!extras.fits(cloud.size())) {
-    return Error{ErrorCode::kBadArgument, Cat(path.string(), ": the other properties (", extras.names(),
-                                              ") are not of these ", WithThousands(cloud.size()), " Gaussians")};
+    return Error{ErrorCode::kBadArgument, Cat(path.string(), ": the extra properties (", extras.names(),
+                                              ") do not match the ", WithThousands(cloud.size()), " Gaussians")};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(PlyOutput file, PlyOutput::Create(path, cloud, cloud.size(), options, extras));
   const auto task = static_cast<int64_t>(std::max<size_t>(1, (size_t{4} << 20) / file.row_size()));

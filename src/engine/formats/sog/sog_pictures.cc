@@ -64,7 +64,7 @@ Result<std::vector<SogChannel>> Channels(const JsonValue& part, int version, siz
   std::vector<SogChannel> channels;
   for (size_t k = 0; k < count; ++k) {
     if (min[k] > max[k])
-      return part.Complain(Cat("has a range from ", min[k], " to ", max[k], ", the wrong way round"));
+      return part.Complain(Cat("has a range from ", min[k], " to ", max[k], ": the minimum is above the maximum"));
     channels.push_back(Range(min[k], max[k]));
   }
   return channels;
@@ -99,7 +99,7 @@ struct Sog {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> sizes, shape->Elements());
     if (sizes.empty()) return shape->Complain("is empty, expected the number of Gaussians");
     ANCHORSPLAT_ASSIGN_OR_RETURN(const int said, sizes[0].WholeNumber(1, std::numeric_limits<int>::max()));
-    if (said != count) return shape->Complain(Cat("says ", said, " Gaussians, the means say ", count));
+    if (said != count) return shape->Complain(Cat("says ", said, " Gaussians, but the means have ", count));
     return {};
   }
 };
@@ -119,7 +119,8 @@ Status VisitMeans(Sog& sog, SogVisitor& visitor) {
     if (std::fabs(range.max[k]) > kMaxLogarithm)
       return maxs.Complain(Cat("holds ", range.max[k], ", expected -88 to 88"));
     if (range.min[k] > range.max[k]) {
-      return part.Complain(Cat("has a range from ", range.min[k], " to ", range.max[k], ", the wrong way round"));
+      return part.Complain(
+          Cat("has a range from ", range.min[k], " to ", range.max[k], ": the minimum is above the maximum"));
     }
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(ByteImage low, sog.Picture(part, 0, 2));
@@ -194,7 +195,8 @@ Status VisitHarmonics(Sog& sog, const JsonValue& part, const SogPalette& palette
     if (const std::optional<JsonValue> bits = part.Find("quantization"); bits && bits->raw() != 8) {
       return bits->Complain(Cat("is ", Printable(bits->raw().dump()), ", expected 8"));
     }
-    if (min > max) return part.Complain(Cat("has a range from ", min, " to ", max, ", the wrong way round"));
+    if (min > max)
+      return part.Complain(Cat("has a range from ", min, " to ", max, ": the minimum is above the maximum"));
     values = Range(min, max);
     for (const float x : values) {
       if (!std::isfinite(x)) return part.Complain(Cat("has a range of ", min, " to ", max));
@@ -266,15 +268,14 @@ Status CheckQuats(const InputFile& file, const JsonValue& part, const ByteImage&
   for (int64_t i = 0; i < count; ++i) unmarked += picture.rgba[static_cast<size_t>(4 * i + 3)] < 252 ? 1 : 0;
   if (unmarked > 0) {
     LogWarning(Cat(file.name(), ": ", WithThousands(unmarked), " of ", WithThousands(count),
-                   " rotations are none (the fourth byte is below 252): read as no rotation"));
+                   " rotations are invalid (fourth byte below 252): read as no rotation"));
   }
   return {};
 }
 
 void WarnOfMeta(const InputFile& file, const JsonValue& meta, const std::optional<JsonValue>& model) {
   if (model && model->raw() != "antialiased" && model->raw() != "default") {
-    LogWarning(Cat(file.name(), ": model is ", Printable(model->raw().dump()),
-                   ", which this version does not know: the splat is read as a classic one"));
+    LogWarning(Cat(file.name(), ": unknown model ", Printable(model->raw().dump()), ": the splat is read as classic"));
   }
   WarnOfAxisEntries(file.name(), OtherSogEntries(meta));
 }

@@ -98,7 +98,7 @@ Result<FormatFacts> DescribeSog(const InputFile& file) {
   }
   std::string others;
   for (const std::string& name : OtherSogEntries(meta)) others += Cat(others.empty() ? "" : ", ", Printable(name));
-  if (!others.empty()) facts.Add("other entries, not heeded", Printable(others, 200));
+  if (!others.empty()) facts.Add("other entries, ignored", Printable(others, 200));
   return facts;
 }
 

@@ -211,8 +211,8 @@ Status WriteSog(const std::filesystem::path& path, const CloudView& cloud, const
   const int64_t width = static_cast<int64_t>(std::ceil(std::sqrt(static_cast<double>(cloud.size())) / 4)) * 4;
   const int64_t height = (cloud.size() + 4 * width - 1) / (4 * width) * 4;
   if (width > kMaxSide || height > kMaxSide) {
-    return Error{ErrorCode::kBadArgument, Cat(path.string(), ": ", WithThousands(cloud.size()),
-                                              " Gaussians are more than a WebP picture has room for")};
+    return Error{ErrorCode::kBadArgument,
+                 Cat(path.string(), ": ", WithThousands(cloud.size()), " Gaussians do not fit into a WebP picture")};
   }
   const std::vector<std::filesystem::path> names = SogFilesBeside(path, cloud.sh_degree);
   const bool bundled = names.empty();

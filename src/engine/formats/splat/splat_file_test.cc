@@ -126,12 +126,12 @@ TEST(SplatFile, TextAndOtherFilesAreNone) {
   };
   std::string text;
   while (text.size() < 3200) text += "A phone capture becomes a splat, and a splat becomes sharper. ";
-  EXPECT_NE(error_of(text.substr(0, 3200)).find("is no .splat file: "), std::string::npos);
+  EXPECT_NE(error_of(text.substr(0, 3200)).find("is not a .splat file: "), std::string::npos);
   EXPECT_NE(error_of(std::string(3200, '\xff')).find("100 of 100 rows"), std::string::npos);
   std::string noise(32'000, '\0');
   Random random(7);
   for (char& c : noise) c = static_cast<char>(random.Below(256));
-  EXPECT_NE(error_of(noise).find("is no .splat file"), std::string::npos);
+  EXPECT_NE(error_of(noise).find("is not a .splat file"), std::string::npos);
   // Half of the rows may be damaged, no more.
   const TestFolder folder;
   ASSERT_TRUE(WriteSplat(folder / "a.splat", RandomCloud(4, 0, 3)).ok());

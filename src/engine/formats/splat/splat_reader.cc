@@ -75,10 +75,9 @@ int64_t UnpackSplat(const uint8_t* bytes, int64_t count, int64_t to, GaussianClo
 
 Status CheckSplatRows(const InputFile& file, int64_t implausible, int64_t count) {
   if (2 * implausible <= count) return {};
-  return Error{
-      ErrorCode::kBadFile,
-      Cat(file.name(), ": is no .splat file: ", WithThousands(implausible), " of ", WithThousands(count),
-          " rows of 32 bytes have positions or scales that are no numbers, negative or above a million millions")};
+  return Error{ErrorCode::kBadFile,
+               Cat(file.name(), ": is not a .splat file: ", WithThousands(implausible), " of ", WithThousands(count),
+                   " rows of 32 bytes have positions or scales that are not finite, negative or above 1e12")};
 }
 
 class SplatBlocks final : public FileBlocks {

@@ -48,8 +48,8 @@ Status WriteSplat(const std::filesystem::path& path, const CloudView& cloud, con
   if (2 * unreadable > cloud.size()) {
     return Error{ErrorCode::kBadArgument,
                  Cat(path.string(), ": ", WithThousands(unreadable), " of ", WithThousands(cloud.size()),
-                     " Gaussians have positions or scales that are no numbers or above a million millions, so that "
-                     "nobody would take the file for a .splat, which has no mark: write another format")};
+                     " Gaussians have positions or scales that are not finite or above 1e12, so the file would not be "
+                     "recognised as a .splat: write another format")};
   }
   const Buffer<uint32_t> rows = WriteOrder(cloud, options.order, SplatOrder::kImportance);
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite, options.memory));

@@ -69,10 +69,10 @@ std::string Fact(const SpzExtension& extension) {
   }
   if (extension.id == kCoordinateSystem && payload.size() == sizeof(uint32_t)) {
     const auto number = ValueAt<uint32_t>(payload, 0);
-    return number == 0 ? "not said (0): taken for RUB" : kSystems[number];
+    return number == 0 ? "not stated (0): read as RUB" : kSystems[number];
   }
   return Cat(WithThousands(std::ssize(payload)), " bytes",
-             extension.id == kGeoreference ? ": where on a planet it lies; positions stay in its own frame" : "");
+             extension.id == kGeoreference ? ": its place on a planet; positions stay in local coordinates" : "");
 }
 
 }  // namespace
@@ -126,8 +126,7 @@ Result<std::optional<Axes>> AxesOfSpz(const std::string& where, std::span<const 
     }
     const auto number = ValueAt<uint32_t>(extension.payload, 0);
     if (number >= kSystems.size()) {
-      return Error{ErrorCode::kBadFile,
-                   Cat(name, " is ", number, ", expected 1 to 16: these axes are unknown to this version")};
+      return Error{ErrorCode::kBadFile, Cat(name, " is ", number, ", expected 1 to 16: unknown axes")};
     }
     const Axes said = number == 0 ? kRub : AxesFromName(kSystems[number]).value();
     if (axes && *axes != said) {
@@ -181,7 +180,7 @@ void DropSpzGeoreference(const std::string& where, std::vector<std::string>& com
   const auto is_place = [&](const std::string& comment) { return comment.starts_with(beginning); };
   if (std::erase_if(comments, is_place) == 0) return;
   LogWarning(
-      Cat(where, ": ", NameOfSpzExtension(kGeoreference), " is dropped, as --coords changes the axes it is for"));
+      Cat(where, ": ", NameOfSpzExtension(kGeoreference), " is dropped, as --coords changes the axes it refers to"));
 }
 
 std::string NamesOfSpzExtensions(std::span<const std::string> comments) {
@@ -220,11 +219,11 @@ void WarnOfSpzExtensions(const std::string& where, std::span<const SpzExtension>
   size_t said = 0;
   for (const SpzExtension& extension : extensions) {
     if (extension.id == kCoordinateSystem || IsKept(extension, axes)) continue;
-    if (said++ == kMostSaid) return LogWarning(Cat(where, ": more extension records are neither used nor kept"));
+    if (said++ == kMostSaid) return LogWarning(Cat(where, ": further extension records are dropped"));
     const std::string_view name = NameOfSpzExtension(extension.id);
     const bool known = name != "unknown";
     LogWarning(Cat(where, ": ", FullRecordName(extension), known ? Cat(" (", name, ")") : "",
-                   known ? " is neither used nor kept" : " is unknown to this version, and neither used nor kept"));
+                   known ? " is not used: dropped" : " is unknown: dropped"));
   }
 }
 

@@ -44,7 +44,7 @@ Result<SpzLayout> CheckHeader(const InputFile& file, const SpzHeader& header, co
   const auto bad = [&file](uint64_t byte, const std::string& what) {
     return Error{ErrorCode::kBadFile, Cat(At(file, byte), " of the SPZ header: ", what)};
   };
-  if (header.magic != kSpzMagic) return bad(0, "does not begin with \"NGSP\": no SPZ file");
+  if (header.magic != kSpzMagic) return bad(0, "does not begin with \"NGSP\": not an SPZ file");
   if (header.version < 1 || header.version > 4) return bad(4, Cat("version ", header.version, ", expected 1 to 4"));
   ANCHORSPLAT_RETURN_IF_ERROR(CheckCount(At(file, 8), header.count, limits));
   if (header.sh_degree > kMaxSpzShDegree) return bad(12, Cat("SH degree ", int{header.sh_degree}, ", expected 0 to 4"));
@@ -126,7 +126,7 @@ Result<SpzFile> OpenStreams(const InputFile& file, const ReadLimits& limits) {
   constexpr uint64_t kHead = sizeof header + sizeof place;
   if (place.offset > file.size() || place.offset - kHead > kMaxSpzExtensionBytes) {
     return Error{ErrorCode::kBadFile,
-                 Cat(At(file, 16), ": has its table at byte ", place.offset, " of ", file.size(), ", behind ",
+                 Cat(At(file, 16), ": has its table at byte ", place.offset, " of ", file.size(), ", after ",
                      place.offset - kHead, " bytes of extension records (at most ", kMaxSpzExtensionBytes, ")")};
   }
   std::string records(static_cast<size_t>(place.offset - kHead), '\0');
@@ -174,7 +174,7 @@ Result<SpzFile> OpenSpz(const InputFile& file, const ReadLimits& limits) {
   std::array<uint32_t, 2> mark{};  // and the version
   ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(0, mark.data(), std::min<size_t>(sizeof mark, file.size())));
   if (mark[0] != kSpzMagic) {
-    return Error{ErrorCode::kBadFile, Cat(At(file, 0), ": does not begin with \"NGSP\": no SPZ file")};
+    return Error{ErrorCode::kBadFile, Cat(At(file, 0), ": does not begin with \"NGSP\": not an SPZ file")};
   }
   return mark[1] < 4 ? OpenOneStream(file, OpenPlain(file, 0), limits) : OpenStreams(file, limits);
 }
@@ -188,15 +188,15 @@ SpzTurn TurnOfSpz(const SpzFile& spz) {
 void WarnOfSpz(const InputFile& file, const SpzFile& spz) {
   if (spz.layout.sh_degree > kMaxShDegree) LogWarning(Cat(file.name(), ": SH degree 4 is read as 3"));
   if (spz.unknown_flags != 0) {
-    LogWarning(Cat(file.name(), ": byte 14 of the SPZ header: sets flags that are unknown to this version (",
-                   int{spz.unknown_flags}, "): what they say is not heeded"));
+    LogWarning(
+        Cat(file.name(), ": byte 14 of the SPZ header: sets unknown flags (", int{spz.unknown_flags}, "): ignored"));
   }
   if (spz.reserved_used) {
-    LogWarning(Cat(file.name(), ": reserved bytes of the SPZ header are not zero: what they say is not heeded"));
+    LogWarning(Cat(file.name(), ": reserved bytes of the SPZ header are not zero: ignored"));
   }
   if (spz.skipped_bytes > 0) {
-    LogWarning(Cat(file.name(), ": byte 32: the ", WithThousands(static_cast<int64_t>(spz.skipped_bytes)),
-                   " bytes behind the SPZ header are no extension records: passed over"));
+    LogWarning(Cat(file.name(), ": byte 32: skipped ", WithThousands(static_cast<int64_t>(spz.skipped_bytes)),
+                   " bytes after the SPZ header that are not extension records"));
   }
   WarnOfSpzExtensions(file.name(), spz.extensions, spz.axes);
 }
@@ -218,14 +218,14 @@ Result<FormatFacts> DescribeSpz(const InputFile& file) {
   facts.Add("version", layout.version,
             layout.version > 3 ? ", a zstd stream per attribute"
             : IsGzip(head)     ? ", one gzip stream"
-                               : ", not compressed itself");
+                               : ", uncompressed");
   if (layout.version == 1) {
     facts.Add("positions", "half floats");
   } else {
     facts.Add("positions", layout.fractional_bits, " fractional bits: steps of 1/",
               uint32_t{1} << layout.fractional_bits);
   }
-  facts.Add("antialiased", spz.antialiased ? "yes" : "no, or not said");
+  facts.Add("antialiased", spz.antialiased ? "yes" : "no, or not stated");
   facts.Add("axes", NameOfAxes(spz.axes));
   if (layout.sh_degree > kMaxShDegree) facts.Add("harmonics", "degree ", layout.sh_degree, ", read as ", kMaxShDegree);
   DescribeSpzExtensions(spz.extensions, facts);

@@ -250,8 +250,8 @@ TEST(Spz, RefusesDamageLiesAndBombs) {
   expect(ErrorOf(Gzip(RawHeader(3, 2, 0, 12, 0) + std::string(39, '\0'))), "ends before");
   // A splat of one Gaussian is 20 bytes of values and not one more, and nothing follows it.
   expect(ErrorOf(Gzip(RawHeader(3, 1, 0, 12, 0) + std::string(20, '\0'))), "accepted");
-  expect(ErrorOf(Gzip(RawHeader(3, 1, 0, 12, 0) + std::string(21, '\0'))), "goes on behind its data");
-  expect(ErrorOf(v3 + "x"), "bytes behind the gzip stream");
+  expect(ErrorOf(Gzip(RawHeader(3, 1, 0, 12, 0) + std::string(21, '\0'))), "continues after its data");
+  expect(ErrorOf(v3 + "x"), "bytes after the gzip stream");
   expect(ErrorOf(v3.substr(0, v3.size() - 1)), "ends before its gzip stream");
   expect(ErrorOf(changed(v3, v3.size() - 6, static_cast<char>(v3[v3.size() - 6] ^ 1))), "damaged");  // the checksum
   EXPECT_EQ(Read(folder / "4.spz", {.max_gaussians = 2999}).error().code, ErrorCode::kBadFile);
@@ -349,10 +349,10 @@ TEST(Spz, RecordsOfExtensions) {
     EXPECT_EQ(read.comments.size(), 1u);
     // A place is one in the axes that it was said for.
     EXPECT_THAT(said(Record(kSystem, Number(6)) + place, &read),
-                testing::ElementsAre(testing::HasSubstr("georeference) is neither used nor kept")));
+                testing::ElementsAre(testing::HasSubstr("georeference) is not used: dropped")));
     EXPECT_TRUE(read.comments.empty());
-    EXPECT_THAT(said(Record(kOrbit, "short")), testing::ElementsAre(testing::HasSubstr("neither used nor kept")));
-    EXPECT_THAT(said("", nullptr, 0x12), testing::ElementsAre(testing::HasSubstr("flags that are unknown")));
+    EXPECT_THAT(said(Record(kOrbit, "short")), testing::ElementsAre(testing::HasSubstr("is not used: dropped")));
+    EXPECT_THAT(said("", nullptr, 0x12), testing::ElementsAre(testing::HasSubstr("unknown flags")));
     EXPECT_THAT(said(Record(kSystem, Number(0))), testing::IsEmpty());
 
     const auto error_of = [&](const std::string& records) { return ErrorOf(WithRecords(cloud, version, records)); };

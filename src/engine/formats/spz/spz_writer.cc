@@ -230,8 +230,8 @@ Status WriteSpz(const std::filesystem::path& path, const CloudView& cloud, const
                  Cat(path.string(), ": SPZ version ", options.spz_version, " is not written, expected 3 or 4")};
   }
   if (cloud.size() > std::numeric_limits<int32_t>::max()) {
-    return Error{ErrorCode::kBadArgument, Cat(path.string(), ": ", WithThousands(cloud.size()),
-                                              " Gaussians are more than an SPZ file can count")};
+    return Error{ErrorCode::kBadArgument,
+                 Cat(path.string(), ": ", WithThousands(cloud.size()), " Gaussians are too many for an SPZ file")};
   }
   const Packer packer{.cloud = cloud,
                       .layout = {options.spz_version, cloud.sh_degree, LookAtMeans(cloud).fractional_bits},
@@ -258,8 +258,8 @@ Strays SpzStrays(const CloudView& cloud) {
 std::string SpzMeanLoss(const CloudView& cloud) {
   const MeansInSpz means = LookAtMeans(cloud);
   if (means.largest > kMaxFixed) {
-    return Cat("coordinates reach ", means.largest, ", SPZ ends at ", kMaxFixed,
-               ": they are clamped, and all others rounded to whole numbers (a PLY keeps them)");
+    return Cat("coordinates reach ", means.largest, ", beyond the SPZ limit of ", kMaxFixed,
+               ": clamped, and all others rounded to whole numbers (a PLY keeps them)");
   }
   const double step = std::ldexp(1.0, -means.fractional_bits);
   if (means.fractional_bits >= kUsualBits) return {};

@@ -62,7 +62,7 @@ Result<Index> ReadIndex(const InputFile& file) {
   const JsonValue root = index.json.root();
   if (const std::optional<JsonValue> version = root.Find("version")) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const int number, version->WholeNumber(0, std::numeric_limits<int>::max()));
-    if (number > 1) return version->Complain(Cat("is ", number, ", and this version reads streamed SOG 1"));
+    if (number > 1) return version->Complain(Cat("is ", number, "; only streamed SOG 1 is supported"));
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue levels, root.Get("lodLevels"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(index.levels, levels.WholeNumber(1, kMostLevels));
@@ -99,7 +99,7 @@ Status CollectRuns(const JsonValue& node, const Index& index, int level, std::ve
     ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue file, found->Get("file"));
     ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue offset, found->Get("offset"));
     ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue count, found->Get("count"));
-    if (index.files.empty()) return file.Complain("names a chunk, and \"filenames\" has none");
+    if (index.files.empty()) return file.Complain("names a chunk, but \"filenames\" has none");
     Run run;
     ANCHORSPLAT_ASSIGN_OR_RETURN(const int chunk, file.WholeNumber(0, static_cast<int>(index.files.size()) - 1));
     ANCHORSPLAT_ASSIGN_OR_RETURN(run.offset, offset.WholeNumber(0, 1 << 28));
@@ -235,7 +235,7 @@ Result<FormatFacts> DescribeStreamedSog(const InputFile& file) {
       counts += Cat(counts.empty() ? ": " : ", ", WithThousands(count));
     }
   }
-  facts.Add("levels of detail", index.levels, counts, counts.empty() ? "" : " Gaussians; read is the finest");
+  facts.Add("levels of detail", index.levels, counts, counts.empty() ? "" : " Gaussians; the finest is read");
   facts.Add("chunks", index.files.size(), index.environment ? " and an environment" : "");
   if (const std::optional<JsonValue> asset = root.Find("asset"); asset && asset->has("generator")) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue generator, asset->Get("generator"));

@@ -315,7 +315,7 @@ TEST_F(ScenesByHand, WhatIsWrongIsSaid) {
     EXPECT_THAT(message, HasSubstr(what));
     EXPECT_THAT(message, HasSubstr("lod-meta.json"));
   };
-  says([](auto& j) { j["version"] = 2; }, "reads streamed SOG 1");
+  says([](auto& j) { j["version"] = 2; }, "only streamed SOG 1 is supported");
   says([](auto& j) { j["lodLevels"] = 0; }, "lodLevels");
   says([](auto&) {}, "has no level 2", 2);
   says([](auto& j) { j.erase("tree"); }, "tree");

@@ -172,7 +172,7 @@ class ChunkWriter {
     if (options_.memory == nullptr) {
       std::error_code failed;
       fs::create_directory(folder, failed);
-      if (failed) return Error{ErrorCode::kIo, Cat(folder.string(), ": cannot make this folder: ", failed.message())};
+      if (failed) return Error{ErrorCode::kIo, Cat(folder.string(), ": cannot create this folder: ", failed.message())};
     }
     CloudWriteOptions as_they_come = options_;
     as_they_come.order = SplatOrder::kKeep;
@@ -298,7 +298,7 @@ class MadeFolder {
     std::error_code failed;
     fs::create_directory(folder, failed);
     if (failed)
-      return Error{ErrorCode::kNotFound, Cat(folder.string(), ": cannot make this folder: ", failed.message())};
+      return Error{ErrorCode::kNotFound, Cat(folder.string(), ": cannot create this folder: ", failed.message())};
     made.folder_ = folder;
     return made;
   }
@@ -316,8 +316,7 @@ class MadeFolder {
 
 Status CheckLodOptions(const fs::path& path, const LodOptions& lod) {
   if (path.filename() != kIndexName) {
-    return Error{ErrorCode::kBadArgument,
-                 Cat(path.string(), ": programs know a streamed SOG by the name ", kIndexName)};
+    return Error{ErrorCode::kBadArgument, Cat(path.string(), ": a streamed SOG must be named ", kIndexName)};
   }
   if (lod.levels >= 1 && lod.levels <= 16 && lod.ratio > 0 && lod.ratio < 1 && lod.chunk_count >= 1 &&
       lod.chunk_count <= 1 << 17 && lod.chunk_extent > 0) {
@@ -357,7 +356,7 @@ Status WriteStreamedSog(const fs::path& path, const CloudView& cloud, const Clou
   }
   if (const int64_t dropped = cloud.size() - static_cast<int64_t>(tree.rows.size()); dropped > 0) {
     LogWarning(Cat(path.string(), ": ", WithThousands(dropped), " of ", WithThousands(cloud.size()), " Gaussians have ",
-                   kWhyUnusable, " and no place in a tree: left out"));
+                   kWhyUnusable, " and cannot be placed in the tree: dropped"));
   }
   const std::vector<int64_t> leaves = LeavesOf(tree);
   ChunkWriter chunks(staged ? staged->path() : parent, options);

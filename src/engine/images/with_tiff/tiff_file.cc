@@ -87,7 +87,7 @@ class TiffPicture {
     TIFFOpenOptionsSetWarningHandlerExtR(options.get(), &OnWarning, &file_);
     tiff_.reset(TIFFClientOpenExt("TIFF", "rm", &file_, &ReadBytes, &WriteNothing, &Seek, &Close, &Length, nullptr,
                                   nullptr, options.get()));
-    if (!tiff_) return Bad("is no TIFF that can be read");
+    if (!tiff_) return Bad("is not a readable TIFF");
     return ReadLayout();
   }
 
@@ -110,7 +110,7 @@ class TiffPicture {
   }
   Error NotRead(const std::string& what) const {
     return Error{ErrorCode::kBadFile, Cat(name_, ": a TIFF with ", what,
-                                          ", which is not read here; save it as grey or RGB with 8 or 16 bits")};
+                                          ", which is not supported; save it as grey or RGB with 8 or 16 bits")};
   }
 
   Status ReadLayout() {
@@ -182,7 +182,7 @@ class TiffPicture {
     }
     if (pages > 1) {
       return Error{ErrorCode::kBadFile,
-                   Cat(name_, ": a TIFF of ", pages, " pages; save the one that is meant in a file of its own")};
+                   Cat(name_, ": a TIFF of ", pages, " pages; save the one you need as a separate file")};
     }
     file_.complaint.clear();
     if (TIFFSetDirectory(tiff_.get(), 0) == 0) return Bad("the TIFF is damaged");

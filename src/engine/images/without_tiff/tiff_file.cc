@@ -7,7 +7,7 @@
 namespace anchorsplat {
 
 Result<Image> DecodeTiff(const std::string& name, std::string) {
-  return Error{ErrorCode::kBadFile, Cat(name, ": a TIFF, which is not read here; convert it to PNG or JPEG")};
+  return Error{ErrorCode::kBadFile, Cat(name, ": a TIFF, which is not supported here; convert it to PNG or JPEG")};
 }
 
 Result<ImageSize> DecodeTiffSize(const std::string& name, std::string bytes) {

@@ -91,8 +91,8 @@ Result<std::string> ReadSettings(const fs::path& path, int descriptor, uint64_t 
   if (!ReadAll(descriptor, text.data(), text.size(), 0)) return CannotOpen(path);
   if (!text.starts_with(kMagic)) {
     return Error{ErrorCode::kBadFile, Cat(path.string(),
-                                          ": is not a checkpoint of a network (--checkpoint FILE names "
-                                          "another place)")};
+                                          ": is not a checkpoint of a network (pass another with "
+                                          "--checkpoint FILE)")};
   }
   const size_t end = text.find('\n', kMagic.size());
   constexpr size_t kDigits = 16;

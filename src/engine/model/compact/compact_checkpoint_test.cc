@@ -180,12 +180,12 @@ TEST_F(CompactCheckpointTest, OfAnotherRunItIsRefusedByName) {
   task = Task();
   const float other_pixel = 2 * kPixel;
   task.pixel_sizes = {&other_pixel, 1};
-  EXPECT_THAT(refused(task), HasSubstr("its pixel size is another one"));
+  EXPECT_THAT(refused(task), HasSubstr("its pixel size differs"));
   task = Task();
   task.choice->merge_cost = 1;
   EXPECT_THAT(refused(task), HasSubstr("merge cost"));
   cloud_.means[30] += 1;
-  EXPECT_THAT(refused(Task()), HasSubstr("its input is another one"));
+  EXPECT_THAT(refused(Task()), HasSubstr("its input differs"));
 }
 
 TEST_F(CompactCheckpointTest, WhatIsNoneIsRefusedAndStays) {

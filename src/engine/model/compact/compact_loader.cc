@@ -136,7 +136,7 @@ Result<CompactNetwork> LoadCompactNetwork(const TensorFile& file) {
   if (!network->HasTrainingRange()) {
     LogWarning(
         Cat(file.name(),
-            ": has no range of training data (domain.low is above domain.high), so all Gaussians count as like them"));
+            ": has no range of training data (domain.low is above domain.high), so no Gaussian counts as unlike it"));
   }
   return network;
 }

@@ -197,7 +197,7 @@ Status CheckTask(const GaussianCloud& cloud, const CompactTask& task, const Comp
       return Error{ErrorCode::kBadArgument, "the network of the stand-ins makes more than one or sees something else"};
     }
   }
-  if (task.block_gaussians < 1) return Error{ErrorCode::kBadArgument, "a block of no Gaussians"};
+  if (task.block_gaussians < 1) return Error{ErrorCode::kBadArgument, "a block needs at least one Gaussian"};
   if (!(task.upscale >= 1) || !std::isfinite(task.upscale) || !(task.strength >= 0) || !std::isfinite(task.strength)) {
     return Error{ErrorCode::kBadArgument, Cat("upscale ", task.upscale, " must be at least 1 and the filter strength ",
                                               task.strength, " not negative")};
@@ -389,7 +389,7 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
         if (of_block.block < next || of_block.block >= blocks.count() ||
             !FitsBlock(of_block, at, task.block_gaussians, copies, output.defers_merging(), stand_ins)) {
           return Error{ErrorCode::kBadFile, Cat(task.checkpoint.string(), ": block ", of_block.block,
-                                                " is none of this run's; -w starts over")};
+                                                " is not of this run; -w starts over")};
         }
         CopyGroups groups;
         if (output.defers_merging()) {

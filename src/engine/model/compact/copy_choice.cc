@@ -40,8 +40,8 @@ void EndWithStandIn(double cost, std::span<CopyGroup::Step> steps) {
 
 Status Validate(const CopyChoice& choice, int64_t made) {
   if (choice.copies && (*choice.copies < 1 || *choice.copies > made)) {
-    return Error{ErrorCode::kBadArgument,
-                 Cat("--copies ", *choice.copies, ": the network makes ", made, ", so it is 1 to ", made, " or auto")};
+    return Error{ErrorCode::kBadArgument, Cat("--copies ", *choice.copies, ": must be 1 to ", made,
+                                              ", the number that the network makes, or auto")};
   }
   if (!(choice.merge_cost >= 0) || !std::isfinite(choice.merge_cost)) {
     return Error{ErrorCode::kBadArgument, Cat("--merge-cost ", choice.merge_cost, " is not 0 or more")};

@@ -31,11 +31,11 @@ Result<Normalisation> FitNormalisation(std::span<const float> means, Normalisati
   }
   if ((mode == NormalisationMode::kAuto || mode == NormalisationMode::kBbox) && !(range >= kSmallestExtent)) {
     return Error{ErrorCode::kBadArgument,
-                 "all Gaussians are at one place: there is no extent to bring into the network's cube"};
+                 "all Gaussians are at one place, so the splat cannot be scaled to the network's cube"};
   }
   if (mode != NormalisationMode::kBbox && !(largest >= kSmallestExtent)) {
     return Error{ErrorCode::kBadArgument,
-                 "all Gaussians are at the origin: there is no extent to bring into the network's cube"};
+                 "all Gaussians are at the origin, so the splat cannot be scaled to the network's cube"};
   }
   if (mode == NormalisationMode::kAuto) {
     const float ratio = centre / std::max(largest, kSmallestExtent);
@@ -58,7 +58,7 @@ Result<Normalisation> FitNormalisation(std::span<const float> means, Normalisati
   }
   if (!std::isfinite(result.scale) || !(result.scale > 0)) {
     return Error{ErrorCode::kBadArgument,
-                 Cat("the splat's extent (", range, ") cannot be brought into the network's cube")};
+                 Cat("the splat's extent (", range, ") cannot be scaled to the network's cube")};
   }
   return result;
 }

@@ -10,7 +10,7 @@ Result<std::shared_ptr<TrainableNetwork>> MakeTrainableNetwork(const std::string
   if (kind == "anchorsplat") return MakePublishedTrainable(options);
   if (kind == "compact") return MakeCompactTrainable(options);
   return Error{ErrorCode::kBadArgument,
-               Cat("kind: there is no network \"", Printable(kind), "\" (anchorsplat and compact are)")};
+               Cat("kind: unknown network \"", Printable(kind), "\" (known: anchorsplat, compact)")};
 }
 
 }  // namespace anchorsplat

@@ -99,7 +99,7 @@ void OptionReader::Integers(const std::string& key, int64_t low, int64_t high, s
 Status OptionReader::Finish() const {
   if (!first_.ok()) return first_;
   if (options_.empty()) return {};
-  return Error{ErrorCode::kBadArgument, Cat(options_.begin()->first, ": there is no such option")};
+  return Error{ErrorCode::kBadArgument, Cat(options_.begin()->first, ": unknown option")};
 }
 
 }  // namespace anchorsplat

@@ -46,7 +46,7 @@ TEST(OptionReader, ComplainsByName) {
   EXPECT_EQ(complaint({{"widths", std::vector<double>{8, 0}}}),
             "widths: expected a list of whole numbers from 1 to 100");
   EXPECT_EQ(complaint({{"unit", "metre"}}), "unit: expected one of \"scale\", \"cube\"");
-  EXPECT_EQ(complaint({{"epsilon", 1.0}}), "epsilon: there is no such option");
+  EXPECT_EQ(complaint({{"epsilon", 1.0}}), "epsilon: unknown option");
 }
 
 }  // namespace

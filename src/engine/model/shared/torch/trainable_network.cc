@@ -3,7 +3,7 @@
 namespace anchorsplat {
 
 Result<std::shared_ptr<const void>> TrainableNetwork::Survey(const NetworkInput&) {
-  return Error{ErrorCode::kBadArgument, "this network sees a splat as a whole: it cannot work on parts"};
+  return Error{ErrorCode::kBadArgument, "this network needs the whole splat: it cannot work on parts"};
 }
 
 void TrainableNetwork::ShareMemory(const std::function<void(torch::Tensor&)>&) {}

@@ -135,7 +135,7 @@ def test_keywords_are_those_of_the_function_for_one(control: Control, scans: Pat
     assert report.done == 1
     by_hand = enhanced_by_hand(native, scans / "a.ply", tmp_path / "a.ply", "--method=filter", "--clean", "--background=1,1,1")
     assert (tmp_path / "out/a.ply").read_bytes() == by_hand
-    with pytest.raises(BadArgumentError, match="cameras: batches take a file"):
+    with pytest.raises(BadArgumentError, match="cameras: expected a file or folder"):
         batch.enhance(scans / "a.ply", tmp_path / "two", cameras=object())
 
 

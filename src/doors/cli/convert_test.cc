@@ -130,7 +130,7 @@ TEST_F(ConvertVerb, SaysWhatIsLost) {
   EXPECT_THAT(dull.out, HasSubstr("of degree 0 out"));
   WriteNanScan(folder_ / "nan.ply");
   EXPECT_THAT(ExpectDone({"convert", folder_ / "nan.ply", folder_ / "nan.csv"}).err,
-              HasSubstr("2 of 2 Gaussians have"));
+              HasSubstr("2 of 2 Gaussians cannot be drawn"));
 }
 
 TEST_F(ConvertVerb, ReportsTheLoss) {

@@ -96,7 +96,7 @@ TEST_F(EnhanceVerb, PixelSizeOfTheCamerasOrOfTheSplat) {
   EXPECT_EQ(run.json()[0]["camera_rule"], "median");
   EXPECT_THAT(FileBytes(folder_ / "cameras.ply").substr(0, 500), HasSubstr("\ncomment world up: 0 "));
   const ProgramRun read = ExpectDone({"enhance", input, "-o", folder_ / "auto.ply", "--method", "filter"});
-  EXPECT_THAT(read.err, AllOf(HasSubstr("looks like a classic 3DGS fit"), HasSubstr("using ")));
+  EXPECT_THAT(read.err, AllOf(HasSubstr("looks like a classic 3DGS fit"), HasSubstr("Using ")));
   EXPECT_THAT(read.out, HasSubstr("(estimated)"));
 
   WriteText(folder_ / "wide.json", R"([{"id":0,"img_name":"a","width":4096,"height":4096,"position":[0,0,-1.7],)"

@@ -99,7 +99,8 @@ TEST(Bundler, WhatIsLeftOutIsCounted) {
   ASSERT_TRUE(set.ok()) << set.error().message;
   ExpectSamePixels(set->cameras, {rig[0]});
   ASSERT_EQ(messages.notes().size(), 1u);
-  EXPECT_NE(messages.notes()[0].find("1 of 3 cameras are not registered"), std::string::npos) << messages.notes()[0];
+  EXPECT_NE(messages.notes()[0].find("1 of 3 cameras skipped: not registered"), std::string::npos)
+      << messages.notes()[0];
   ASSERT_EQ(messages.warnings().size(), 1u);
   EXPECT_NE(messages.warnings()[0].find("1 of 2 cameras skipped"), std::string::npos) << messages.warnings()[0];
   std::filesystem::remove(folder / "a.png");

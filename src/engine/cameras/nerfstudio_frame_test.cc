@@ -134,7 +134,7 @@ TEST(NerfstudioFrame, FolderOfARunNamesItsData) {
     EXPECT_NE(set.error().message.find(words), std::string::npos) << set.error().message;
     EXPECT_NE(set.error().message.find("next to the transforms.json"), std::string::npos) << set.error().message;
   };
-  refused("no config.yml");
+  refused("without a config.yml");
   const auto config = [&](const std::string& parts) {
     WriteText(run / "config.yml",
               "!!python/object:nerfstudio.engine.trainer.TrainerConfig\n_target: !!python/name:x ''\n"

@@ -315,7 +315,7 @@ TEST(EditFiles, ErrorsNameTheActionAndTheFile) {
   EXPECT_THAT(error({{"--filter-sphere", "50,0,0,1"}}, folder / "o.ply"),
               HasSubstr("--filter-sphere 50,0,0,1 removes the last 20 Gaussians: nothing to write"));
   EXPECT_THAT(error({{"--scale", "2"}}, input), HasSubstr("a.ply"));
-  EXPECT_THAT(error({{"--scale", "2"}}, folder / "o.txt"), HasSubstr("no extension of a splat format"));
+  EXPECT_THAT(error({{"--scale", "2"}}, folder / "o.txt"), HasSubstr("no splat extension"));
 }
 
 }  // namespace

@@ -129,10 +129,10 @@ TEST_F(Refinement, GoesOnWhereItWasStopped) {
   // The same counts are not the same run.
   RefineInput other = input_;
   other.cloud.sh[0] += 0.01f;
-  EXPECT_THAT(Refine(other, options_, control).error().message, HasSubstr("its input is"));
+  EXPECT_THAT(Refine(other, options_, control).error().message, HasSubstr("its input differs"));
   other = input_;
   other.start.log_scales[0] += 0.01f;
-  EXPECT_THAT(Refine(other, options_, control).error().message, HasSubstr("its start is"));
+  EXPECT_THAT(Refine(other, options_, control).error().message, HasSubstr("its start differs"));
 
   // Nor are other pictures of the same names, or one bit of the state.
   const auto picture = project() / (cameras_.cameras[2].name + ".png"), aside = folder_ / "aside.png";

@@ -286,7 +286,7 @@ TEST(Convert, SaysWhatHasNoPlaceInTheFormat) {
 
   cloud = tame;
   cloud.means[0] = 30'000;  // one stray Gaussian
-  const auto stray = AllOf(HasSubstr("1 of 2,000 Gaussians, up to 30000 from"), HasSubstr("a PLY keeps them all"));
+  const auto stray = AllOf(HasSubstr("1 of 2,000 Gaussians lie up to 30000 from"), HasSubstr("a PLY keeps them all"));
   EXPECT_THAT(warn(cloud, ".compressed.ply"), ElementsAre(stray));
   EXPECT_THAT(warn(cloud, ".spz"), ElementsAre(stray));
   EXPECT_THAT(warn(cloud, ".sog"), IsEmpty());

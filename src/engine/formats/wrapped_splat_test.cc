@@ -198,7 +198,7 @@ TEST_F(WrappedSplat, ArchivesOfOtherThings) {
   const std::string ply = As("a.ply"), sog = As("a.sog");
   EXPECT_CONTAINS(ErrorOf(Zip("a.zip", {{"x/one.ply", ply}, {"two.spz", "x"}})),
                   "a.zip: is a ZIP archive with 2 splats (x/one.ply, two.spz): unpack it and pass one of them");
-  EXPECT_CONTAINS(ErrorOf(Zip("a.zip", {{"a.txt", "a"}, {"b.txt", "b"}})), "without a splat; in it are a.txt, b.txt");
+  EXPECT_CONTAINS(ErrorOf(Zip("a.zip", {{"a.txt", "a"}, {"b.txt", "b"}})), "without a splat; it contains a.txt, b.txt");
   EXPECT_CONTAINS(ErrorOf(Zip("a.zip", {})), "is an empty ZIP archive");
   EXPECT_CONTAINS(ErrorOf(Zip("a.zip", {{"scene/0_0/meta.json", "{}"}, {"scene/lod-meta.json", "{}"}})),
                   "ZIP archive of a streamed SOG");

@@ -177,7 +177,7 @@ TEST(Recipe, WhatIsMadeFromAnotherNeedsIt) {
   EXPECT_TRUE(says("after = \"spz\"", "needs from"));
   EXPECT_TRUE(says("from = \"a\"\nafter = \"zip\"", "known are spz, sog, splat and enhanced"));
   EXPECT_TRUE(says("from = \"a\"\nafter = \"spz\"\nsteps = 3", "takes all settings of that entry"));
-  EXPECT_TRUE(says("from = \"a\"\nafter = \"spz\"\nobjects = 3", "only 2 have"));
+  EXPECT_TRUE(says("from = \"a\"\nafter = \"spz\"\nobjects = 3", "only 2 objects have"));
   EXPECT_TRUE(says("from = \"a\"\nafter = \"spz\"\n[[mix]]\nfrom = \"a-spz\"\nafter = \"sog\"", "is itself derived"));
   EXPECT_FALSE(Read("[[mix]]\nname = \"a\"\n[[mix]]\nfrom = \"a\"\nafter = \"spz\"").ok());  // one of them is drawn
   EXPECT_FALSE(Read("draws = \"some\"\n[[mix]]").ok());

@@ -155,7 +155,7 @@ TEST(Benchmark, NamesWhatIsMissing) {
   MakePublishedObject(folder / "ball", ThinBall(), Ball());
   const BenchmarkEntry entry = ListBenchmark(folder.path())->front();
   fs::rename(entry.folder / "48" / "images" / "004.png", entry.folder / "other.png");
-  EXPECT_THAT(OpenObject(entry)->Truth(4).error().message, HasSubstr("no high-resolution picture 004"));
+  EXPECT_THAT(OpenObject(entry)->Truth(4).error().message, HasSubstr("neither the high-resolution picture 004"));
   EXPECT_TRUE(OpenObject(entry)->Truth(3).ok());
   fs::rename(entry.folder / "other.png", entry.folder / "48" / "images" / "004.png");
   fs::remove_all(entry.folder / "16" / "gaussian_splatting");

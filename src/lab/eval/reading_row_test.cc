@@ -209,7 +209,7 @@ TEST_F(ReadingRowMaking, BadTasksAreRefused) {
   EXPECT_THAT(refused(R"({"id":"a","splat":"a","object":"o","places":1.5})"), HasSubstr("whole number"));
   EXPECT_THAT(refused(R"({"id":"a","splat":"a","object":"o","places":-1})"), HasSubstr("whole number"));
   EXPECT_THAT(refused(R"([])"), HasSubstr("not a JSON object"));
-  EXPECT_THAT(refused(R"({"id":"a"})"), HasSubstr("a splat"));
+  EXPECT_THAT(refused(R"({"id":"a"})"), HasSubstr("splat is missing"));
   EXPECT_THAT(refused(R"({"id":"a","splat":"a.ply","pixel":3})"), HasSubstr("unknown property pixel"));
   EXPECT_THAT(refused(R"({"id":"a","splat":"a.ply","keep":[0]})"), HasSubstr("neither a box"));
   EXPECT_THAT(refused(R"({"id":"a","splat":3})"), HasSubstr("another type"));
@@ -223,7 +223,7 @@ TEST_F(ReadingRowMaking, BadTasksAreRefused) {
   EXPECT_THAT(refused(R"({"id":"a","splat":"a","downscale":0})"), HasSubstr("downscale"));
   EXPECT_THAT(
       refused(R"({"id":"a","splat":"a","moved":{"scale":1,"rotation":[0,0,0,0,0,0,0,0,0],"translation":[0,0,0]}})"),
-      HasSubstr("no rotation"));
+      HasSubstr("not a rotation"));
   EXPECT_THAT(refused(R"({"id":"a","splat":"a","others":{"from":0,"pixel":1}})"), HasSubstr("others"));
   ReadingTask task = Task(Sparse());
   task.others_from = 1'000'000;

@@ -103,7 +103,7 @@ TEST_F(DatasetVerb, Check) {
               HasSubstr("picture 000 is missing"));
   // `eval` says so, too.
   ExpectRefused({"eval", set_, "-o", folder_ / "out", "--methods", "raw"}, ErrorCode::kBadFile,
-                {"no high-resolution picture 000"});
+                {"neither the high-resolution picture 000"});
 }
 
 TEST_F(DatasetVerb, Split) {

@@ -275,7 +275,7 @@ TEST(Gltf, RefusesLiesAndCircles) {
   expect(error_with("/meshes/0/primitives/0/extensions", Json::object()), "without splats");
   expect(error_with("/nodes", Json::parse(R"([{"children":[1]},{"children":[0]}])")), "their own ancestors");
   expect(error_with("/nodes", Json::parse(R"([{"children":[2]},{"children":[2]},{"mesh":0}])")), "shares a child");
-  expect(error_with("/nodes", Json::parse(R"([{"children":[7]}])")), "no node");
+  expect(error_with("/nodes", Json::parse(R"([{"children":[7]}])")), "is not a node");
   expect(error_with("/nodes/0/rotation", {0, 0, 0, 0}), "is zero");
   expect(error_with("/nodes/0/scale", {0, 0, 0}), "stretches");
   expect(error_with("/nodes/0/matrix", {1, 0, 0, 0, 0.5, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}), "shears");
@@ -290,7 +290,7 @@ TEST(Gltf, RefusesLiesAndCircles) {
   expect(error_with("/meshes/0/primitives/0/targets", Json::array({Json::object()})), "morphs");
   expect(error_with("/extensionsUsed", {"KHR_spz_gaussian_splats_compression"}), "accepted");
   expect(error_with("/scenes", Json::array({Json::object()})), "without splats");
-  expect(error_with("/scenes", Json::parse(R"([{"nodes":[3]}])")), "no node");
+  expect(error_with("/scenes", Json::parse(R"([{"nodes":[3]}])")), "is not a node");
   expect(error_with("/scene", 2), "accepted");
   expect(error_with("/nodes/0/scale", {1, 2, 1}), "stretches");
   expect(error_with("/nodes/0/mesh", 1), "there are 1 meshes");
@@ -327,7 +327,7 @@ TEST(Gltf, RefusesLiesAndCircles) {
   Glb crowd = good;
   crowd.json["nodes"] = Json::array();
   for (int k = 0; k < 2000; ++k) crowd.json["nodes"].push_back({{"mesh", 0}});
-  expect(Read(crowd.bytes()).error().message, "more than 1024");
+  expect(Read(crowd.bytes()).error().message, "the limit of 1024 splat");
 }
 
 }  // namespace

@@ -233,7 +233,7 @@ TEST(StreamedSog, OptionsAndNamesThatMakeNoSense) {
     EXPECT_FALSE(status.ok());
     return status.ok() ? "" : status.error().message;
   };
-  EXPECT_THAT(refused("scene.json", {}), HasSubstr("by the name lod-meta.json"));
+  EXPECT_THAT(refused("scene.json", {}), HasSubstr("must be named lod-meta.json"));
   EXPECT_THAT(refused("lod-meta.json", {.levels = 0}), HasSubstr("1 to 16 levels"));
   EXPECT_THAT(refused("lod-meta.json", {.ratio = 1}), HasSubstr("a ratio between"));
   EXPECT_THAT(refused("lod-meta.json", {.chunk_count = 0}), HasSubstr("chunks of 1"));

@@ -98,6 +98,8 @@ TEST_F(EnhanceVerb, PixelSizeOfTheCamerasOrOfTheSplat) {
   const ProgramRun read = ExpectDone({"enhance", input, "-o", folder_ / "auto.ply", "--method", "filter"});
   EXPECT_THAT(read.err, AllOf(HasSubstr("looks like a classic 3DGS fit"), HasSubstr("Using ")));
   EXPECT_THAT(read.out, HasSubstr("(estimated)"));
+  const ProgramRun given = ExpectDone({"enhance", input, "-o", folder_ / "given.ply", "--pixel-size", "5"});
+  EXPECT_THAT(given.err, HasSubstr("--pixel-size 5 is outside the splat's own estimate (0.00"));
 
   WriteText(folder_ / "wide.json", R"([{"id":0,"img_name":"a","width":4096,"height":4096,"position":[0,0,-1.7],)"
                                    R"("rotation":[[1,0,0],[0,1,0],[0,0,1]],"fx":4944,"fy":4944}])");

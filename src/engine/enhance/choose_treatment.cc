@@ -278,6 +278,15 @@ std::string_view LostNothing(const GaussianCloud& cloud) {
   return "";
 }
 
+// Cameras of larger pictures than the splat was fitted to cost most of the gain.
+void SayIfUnlike(const Reading& reading, double pixel, PixelSizeSource source) {
+  if (pixel >= reading.low && pixel <= reading.high) return;
+  const bool given = source == PixelSizeSource::kGiven;
+  LogInfo(Cat(given ? "--pixel-size " : "the cameras' pixel size, ", pixel, given ? "" : ",",
+              " is outside the splat's own estimate (", reading.low, " to ", reading.high, ")",
+              given || pixel > reading.high ? "" : ". If it was fitted to smaller pictures, pass their --train-width"));
+}
+
 }  // namespace
 
 Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceInput& input, EnhanceReport& report) {
@@ -360,6 +369,9 @@ Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceI
     } else if (!(said && known.pixel)) {  // else nothing was taken from the reading
       SayWhatIsTaken(treatment, report);
     }
+  }
+  if (closer && !none && known.pixel && reading.ok() && lost_nothing.empty() && treatment.pixel == *known.pixel) {
+    SayIfUnlike(*reading, *known.pixel, report.pixel_size_source);
   }
   if (!none && !known.pixel && !part_alone && !options.filter_strength) {
     ReadParts(plan, request, treatment, model, input, report);

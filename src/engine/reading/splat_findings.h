@@ -12,8 +12,8 @@
 #include "reading/treatment.h"
 
 namespace anchorsplat {
+
 // What a splat is and what may be wrong with it, as shown by `info`.
-// What a splat is and what is wrong with it: what `info` tells.
 struct SplatFindings {
   std::string file;    // empty: a splat in memory
   std::string format;  // by content

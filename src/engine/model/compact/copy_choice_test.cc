@@ -354,7 +354,7 @@ TEST(CopyChoice, WhereOneStaysItIsTheStandIn) {
   }
 }
 
-// Of which there is no telling what they would look like.
+// Their appearance cannot be predicted.
 TEST(CopyChoice, AStandInThatIsNoneLeavesTheCopies) {
   const GaussianCloud made = Copies(40, 4, 0.2);
   GaussianCloud broken = SheetCloud(40, 1, 9);

@@ -280,7 +280,7 @@ std::string_view LostNothing(const GaussianCloud& cloud) {
 
 // Cameras of larger pictures than the splat was fitted to cost most of the gain.
 void SayIfUnlike(const Reading& reading, double pixel, PixelSizeSource source) {
-  if (pixel >= reading.low && pixel <= reading.high) return;
+  if (reading.strangeness > 1 || (pixel >= reading.low && pixel <= reading.high)) return;
   const bool given = source == PixelSizeSource::kGiven;
   LogInfo(Cat(given ? "--pixel-size " : "the cameras' pixel size, ", pixel, given ? "" : ",",
               " is outside the splat's own estimate (", reading.low, " to ", reading.high, ")",

@@ -401,7 +401,8 @@ TEST(PlyReader, RowsThatTheHeaderKnowsNothingOf) {
     ASSERT_TRUE(read.ok()) << read.error().message;
     EXPECT_EQ(read->size(), 2);
     ASSERT_EQ(messages.warnings().size(), 1u) << encoding;
-    EXPECT_NE(messages.warnings()[0].find("what follows its 2 Gaussians"), std::string::npos) << messages.warnings()[0];
+    EXPECT_NE(messages.warnings()[0].find("its 2 Gaussians, as the header does not mention"), std::string::npos)
+        << messages.warnings()[0];
   }
 }
 

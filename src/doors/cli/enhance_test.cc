@@ -39,7 +39,7 @@ TEST_F(EnhanceVerb, Filter) {
   EXPECT_THAT(run.out,
               AllOf(HasSubstr("scan.ply -> "), HasSubstr("200 Gaussians in, 200 out; filter 4x, filter strength "),
                     HasSubstr("pixel size 0.02 (given)")));
-  EXPECT_THAT(run.err, IsEmpty());
+  EXPECT_THAT(run.err, HasSubstr("--pixel-size 0.02 is outside the splat's own estimate (0.05"));
   const nlohmann::json row =
       ExpectJson(Enhance({"--method", "filter", "--upscale", "2", "--filter-strength", "0.5"}, "two.ply"))[0];
   EXPECT_EQ(row["input"], scan_);

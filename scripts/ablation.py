@@ -5,8 +5,8 @@
 
 TRAIN and VALIDATION are data sets of `anchorsplat dataset build`; WORK gets a folder per variant and the true views that
 all of them share, and a variant that is there already is not trained again. Every variant is configs/compact-k4.toml
-with the changes of VARIANTS, trained for so many minutes by one thread; `--jobs` of them at once. Prints the table of
-docs/results/training-study.md.
+with the changes of VARIANTS, trained for so many minutes by one thread; `--jobs` of them at once.
+docs/benchmarks.md#training says what came out.
 """
 import argparse
 import concurrent.futures

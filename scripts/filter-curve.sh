@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The curves of docs/results/filter.md: PSNR of the examples over the filter's strength, and over an error of the pixel size.
+# Two curves (docs/benchmarks.md#the-filter): PSNR of the examples over the filter's strength, and over an error of the pixel size.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 program=build/anchorsplat

@@ -4,7 +4,7 @@ AC3D models of flightgear-data-ai (scripts/fetch-objects.sh gets both).
 
     scripts/make-object-lists.py --program build/lean/anchorsplat --objects OBJECTS_DIR --out data
 
-The rules, which never look at a result (docs/results/objects.md says why):
+The rules, which never look at a result:
 
 * usable: 300 to 50,000 visible triangles, and a texture or at least three colours.
 * variants: objects of one library and creator whose names differ only in numbers, colours, materials and sizes, or that

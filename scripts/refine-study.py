@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What docs/results/refine-study.md measures beside the benchmarks: imperfect pictures, splats that are fine already, fits with area
+"""What docs/benchmarks.md#refinement says of imperfect pictures, splats that are fine already, fits with area
 pixels, a scene of NeRF-synthetic's kind.
 
     scripts/refine-study.py imperfect|fine|equal-time WORK [--program build/anchorsplat] [--objects a,b]

@@ -12,7 +12,7 @@ namespace anchorsplat {
 
 namespace {
 constexpr int64_t kRowsPerTask = 16384;
-// Limit of f for large upscale. Antialiased fits get 0.12 at u = 4 (docs/results/antialiased.md). Mip-Splatting fits
+// Limit of f for large upscale. Antialiased fits get 0.12 at u = 4 (docs/benchmarks.md#antialiased). Mip-Splatting fits
 // keep the width of their 3-D filter; they get almost nothing, just enough for networks to build on.
 constexpr double kClassicShare = 1 - 1 / 3.6, kAntialiasedShare = 0.06, kMipShare = 0.01;
 

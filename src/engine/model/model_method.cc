@@ -141,13 +141,12 @@ class LastNetwork {
 
 Shipped ShippedFor(const EnhanceInput& input, const ModelSettings& model) {
   if (IsCompensated(input.cloud.render_mode)) return Shipped::kAntialiased;
-  // 0.6 dB better than merging four copies into one, over fifteen fits (docs/results/copies.md).
+  // 0.6 dB better than merging four copies into one, over fifteen fits (docs/benchmarks.md#one-for-one).
   if (model.copies == 1) return Shipped::kSingle;
   return input.visible_share >= kStandardVisibleShare ? Shipped::kStandard : Shipped::kClassic;
 }
 
-// Benefit (docs/results/copies.md): large for dense splats; none for standard fits unless a budget leaves few copies of
-// each.
+// Benefit: large for dense splats; none for standard fits unless a budget leaves few copies of each.
 bool WantsStandIns(Shipped shipped, const EnhanceInput& input, const ModelSettings& model) {
   const bool pays = shipped == Shipped::kClassic || (shipped == Shipped::kStandard && model.options.max_gaussians > 0);
   return model.file.empty() && pays && !model.copies && !input.is_refined;

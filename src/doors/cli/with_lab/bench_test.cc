@@ -18,7 +18,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// What is measured needs a quiet machine and is no test (docs/results/speed.md); that words are understood is.
+// What is measured needs a quiet machine and is no test (docs/benchmarks.md#speed); that words are understood is.
 TEST(BenchVerb, TakesAndRefusesWords) {
   const TestFolder folder;
   const std::string none = folder / "none.ply";

@@ -21,11 +21,9 @@ pack() {
   mkdir -p "$folder/lib" "$folder/lib-compiler"
   cp "$here/gpu-bench.sh" "$here/gpu-bench-gsplat.py" "$folder/"
   cp "$program" "$folder/anchorsplat"
-  local name
-  for name in stone_lantern tankard; do
-    mkdir -p "$folder/examples/$name"
-    cp -r "$here/../examples/$name/"{lr,transforms_lr.json,input.ply} "$folder/examples/$name/"
-  done
+  mkdir -p "$folder/examples/"{stone_lantern,tankard}
+  cp -r "$here/../examples/stone_lantern/"{lr,transforms_lr.json} "$folder/examples/stone_lantern/"
+  cp -r "$here/../examples/tankard/"{lr,transforms_lr.json,input.ply} "$folder/examples/tankard/"
   strip "$folder/anchorsplat"
   cp "$library" "$folder/libwgpu_native.so"
   cp -L "$loader" "$folder/lib/libvulkan.so.1"

@@ -56,10 +56,10 @@ Result<MethodPlan> PlanQuality(const EnhanceOptions& options) {
     plan.method = BestInstant(options);
   } else {
     plan.start = StartWithDetail(options);
-    ANCHORSPLAT_ASSIGN_OR_RETURN(plan.method,
-                                 FindMethod(options, pictures ? "refine-images"
-                                                     : quality == "best" && CanEnlarge(options.upscale) ? "detail"
-                                                                                                        : "refine"));
+    const bool enlarges = quality == "best" && CanEnlarge(options.upscale);
+    ANCHORSPLAT_ASSIGN_OR_RETURN(plan.method, FindMethod(options, pictures   ? "refine-images"
+                                                                  : enlarges ? "detail"
+                                                                             : "refine"));
   }
   if (options.method != "auto" && options.method != plan.Name()) {
     return Error{ErrorCode::kBadArgument, Cat(plan.chosen_by, " is --method ", plan.Name(),

@@ -81,7 +81,9 @@ function(anchorsplat_room name)
     if(ANCHORSPLAT_SANITIZE)
       target_link_libraries(${name}_test PRIVATE anchorsplat_sanitizer_defaults)
     endif()
-    if(NOT name MATCHES "^(bench|cameras|cli|dataset|formats|images|io|metrics|model.*|render|tensors)$")  # their tests call what they compare alike
+    set(separate bench cameras cli compact dataset formats images io kernels metrics model model_torch network published render
+        tensors)  # their tests call what they compare alike
+    if(NOT name IN_LIST separate)
       anchorsplat_unity(${name}_test)
     endif()
     target_link_libraries(${name}_test PRIVATE anchorsplat_${name} anchorsplat_source_dir_for_test

@@ -5,8 +5,8 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 rooms=("$@")
-[ $# -gt 0 ] || rooms=(core gpu io images tensors cameras formats render metrics compare edit viewer fit upscale enhance model_kernels model_shared
-  model_published model_compact model web)
+[ $# -gt 0 ] || rooms=(core gpu io images tensors cameras formats render metrics compare edit viewer fit upscale enhance kernels network
+  published compact model web)
 scripts/web/compile.sh "${rooms[@]/%/_test}" >build/web-rooms.log 2>&1 || { grep -A 20 '^FAILED' build/web-rooms.log; exit 1; }
 failed=0
 for room in "${rooms[@]}"; do

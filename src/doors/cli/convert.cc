@@ -27,7 +27,7 @@
 #include "formats/wrapped_splat.h"
 #include "io/atomic_file.h"
 #include "io/input_record.h"
-#include "model/published/published_checkpoint_writer.h"
+#include "published/published_checkpoint_writer.h"
 #include "request/choice.h"
 #include "request/convert_flags.h"
 

@@ -16,11 +16,11 @@
 #include "cli/gpu_report.h"
 #include "cli/lab.h"
 #include "cli/verb.h"
+#include "compact/shipped_network.h"
 #include "core/memory_limit.h"
 #include "core/parallel.h"
 #include "core/text.h"
-#include "model/compact/shipped_network.h"
-#include "model/kernels/bfloat16_tile.h"
+#include "kernels/bfloat16_tile.h"
 
 namespace anchorsplat {
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "model/published/enhance_with_published.h"
+#include "published/enhance_with_published.h"
 
 namespace anchorsplat {
 
@@ -17,7 +17,7 @@ struct ModelSettings {
   // Of the published network. Compact networks use only `prune_opacity` and `max_gaussians`, which limits their output
   // (CopyChoice).
   PublishedOptions options;
-  // Of compact networks: see CopyChoice in model/compact/copy_choice.h.
+  // Of compact networks: see CopyChoice in compact/copy_choice.h.
   std::optional<int64_t> copies;     // unset: auto
   std::optional<double> merge_cost;  // unset: the default there
 };

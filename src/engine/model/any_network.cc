@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "model/published/published_checkpoint.h"
+#include "published/published_checkpoint.h"
 #include "tensors/tensor_file.h"
 
 namespace anchorsplat {

@@ -3,9 +3,9 @@
 #include <filesystem>
 #include <variant>
 
+#include "compact/compact_network.h"
 #include "core/result.h"
-#include "model/compact/compact_network.h"
-#include "model/published/published_network.h"
+#include "published/published_network.h"
 
 namespace anchorsplat {
 

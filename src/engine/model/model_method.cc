@@ -9,6 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include "compact/compact_checkpoint.h"
+#include "compact/copy_choice.h"
+#include "compact/shipped_network.h"
 #include "core/activations.h"
 #include "core/log.h"
 #include "core/stopwatch.h"
@@ -18,11 +21,8 @@
 #include "enhance/gaussian_budget.h"
 #include "enhance/unseen_gaussians.h"
 #include "io/file_version.h"
+#include "kernels/bfloat16_tile.h"
 #include "model/any_network.h"
-#include "model/compact/compact_checkpoint.h"
-#include "model/compact/copy_choice.h"
-#include "model/compact/shipped_network.h"
-#include "model/kernels/bfloat16_tile.h"
 
 namespace anchorsplat {
 

@@ -1,8 +1,8 @@
 #pragma once
 
+#include "compact/compact_network.h"
 #include "core/result.h"
 #include "enhance/enhance.h"
-#include "model/compact/compact_network.h"
 
 namespace anchorsplat {
 
@@ -21,7 +21,7 @@ const std::vector<EnhanceMethod>& AllMethods();
 // network without `knows_kind` knows only classic ones.
 //
 // `model`: only the settings that choose among copies are used. `control`: where finished blocks are saved for resuming
-// (model/compact/compact_checkpoint.h). `stand_in`: see CompactTask.
+// (compact/compact_checkpoint.h). `stand_in`: see CompactTask.
 // Errors: kBadFile if no output of the network is finite; kBadArgument as Validate(CopyChoice).
 Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upscale, const CompactNetwork& network,
                                                 const ModelSettings& model, StepReport& report,

@@ -13,14 +13,14 @@
 #include <variant>
 #include <vector>
 
+#include "compact/sheet_cloud_for_test.h"
+#include "compact/shipped_network.h"
 #include "core/log.h"
 #include "core/random.h"
 #include "core/text.h"
 #include "enhance/enhance.h"
-#include "model/compact/sheet_cloud_for_test.h"
-#include "model/compact/shipped_network.h"
-#include "model/kernels/bfloat16_tile.h"
-#include "model/published/published_checkpoint_writer.h"
+#include "kernels/bfloat16_tile.h"
+#include "published/published_checkpoint_writer.h"
 #include "tensors/safetensors.h"
 
 namespace anchorsplat {

@@ -4,11 +4,11 @@
 #include <utility>
 #include <vector>
 
+#include "compact/compact_network.h"
 #include "core/file_system.h"
 #include "formats/gsplat_checkpoint/gsplat_checkpoint.h"
 #include "io/input_file.h"
-#include "model/compact/compact_network.h"
-#include "model/published/published_checkpoint_writer.h"
+#include "published/published_checkpoint_writer.h"
 #include "tensors/tensor_file.h"
 
 namespace anchorsplat {

@@ -5,15 +5,15 @@
 
 #include "core/buffer.h"
 #include "core/parallel.h"
-#include "model/kernels/matrix_tile.h"
+#include "kernels/matrix_tile.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "upscale/convolution.cc"
 #include <hwy/foreach_target.h>  // compiles this file once per SIMD target
 #include <hwy/highway.h>
 
-#include "model/kernels/matrix_tile-inl.h"
-#include "model/kernels/vector_math-inl.h"
+#include "kernels/matrix_tile-inl.h"
+#include "kernels/vector_math-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace anchorsplat {

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <span>
 
-#include "model/kernels/packed_weights.h"
+#include "kernels/packed_weights.h"
 #include "upscale/feature_map.h"
 
 namespace anchorsplat {

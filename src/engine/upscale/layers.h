@@ -5,7 +5,7 @@
 
 #include "core/buffer.h"
 #include "core/result.h"
-#include "model/kernels/packed_weights.h"
+#include "kernels/packed_weights.h"
 #include "tensors/tensor_file.h"
 
 namespace anchorsplat {

@@ -6,8 +6,8 @@
 
 #include "bench/plain_product.h"
 #include "core/parallel.h"
-#include "model/kernels/bfloat16_tile.h"
-#include "model/published/enhance_with_published.h"
+#include "kernels/bfloat16_tile.h"
+#include "published/enhance_with_published.h"
 
 namespace anchorsplat {
 

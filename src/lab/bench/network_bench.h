@@ -6,7 +6,7 @@
 
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
-#include "model/published/published_network.h"
+#include "published/published_network.h"
 
 namespace anchorsplat {
 

@@ -5,7 +5,7 @@
 
 #include "core/buffer.h"
 #include "core/random.h"
-#include "model/kernels/linear.h"
+#include "kernels/linear.h"
 
 namespace anchorsplat {
 

@@ -8,6 +8,8 @@
 #include <memory>
 #include <set>
 
+#include "compact/copy_choice.h"
+#include "compact/shipped_network.h"
 #include "core/log.h"
 #include "core/splat_comments.h"
 #include "core/text.h"
@@ -18,10 +20,8 @@
 #include "metrics/bicubic.h"
 #include "metrics/image_metrics.h"
 #include "model/any_network.h"
-#include "model/compact/copy_choice.h"
-#include "model/compact/shipped_network.h"
 #include "model/model_method.h"
-#include "model/published/enhance_with_published.h"
+#include "published/enhance_with_published.h"
 #include "reading/reading_model.h"
 #include "render/constant_cloud.h"
 #include "render/rasterizer.h"

@@ -3,7 +3,7 @@
 #include <utility>
 #include <vector>
 
-#include "model/compact/copy_choice.h"
+#include "compact/copy_choice.h"
 #include "render/constants.h"
 
 namespace anchorsplat {

@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "core/render_mode.h"
-#include "model/shared/torch/gaussian_tensors.h"
+#include "network/torch/gaussian_tensors.h"
 
 namespace anchorsplat {
 
@@ -17,7 +17,7 @@ struct MergeRule {
   double cost = 0;  // maximum cost of a merge
 };
 
-// Merges a network's copies on the CPU as `enhance` does (model/compact/copy_choice.h): returns the unmerged ones, then
+// Merges a network's copies on the CPU as `enhance` does (compact/copy_choice.h): returns the unmerged ones, then
 // the merged ones. Training through this makes networks produce copies that merge well.
 //
 // Values are exactly those of the merge. The gradient is that of the copies' mass, mean and covariance to first order

@@ -4,9 +4,9 @@
 
 #include <cmath>
 
+#include "compact/choose_copies_for_test.h"
+#include "compact/sheet_cloud_for_test.h"
 #include "core/random.h"
-#include "model/compact/choose_copies_for_test.h"
-#include "model/compact/sheet_cloud_for_test.h"
 
 namespace anchorsplat {
 namespace {

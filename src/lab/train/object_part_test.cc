@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <set>
 
-#include "model/compact/sheet_cloud_for_test.h"
-#include "model/shared/torch/render_op.h"
+#include "compact/sheet_cloud_for_test.h"
+#include "network/torch/render_op.h"
 #include "render/rasterizer.h"
 
 namespace anchorsplat {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/result.h"
-#include "model/shared/torch/trainable_network.h"
+#include "network/torch/trainable_network.h"
 #include "train/train_config.h"
 
 namespace anchorsplat {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "core/camera.h"
-#include "model/shared/torch/render_op.h"
-#include "model/shared/torch/trainable_network.h"
+#include "network/torch/render_op.h"
+#include "network/torch/trainable_network.h"
 #include "render/rasterizer.h"
 #include "train/augmentation.h"
 #include "train/photometric_objective.h"

@@ -4,8 +4,8 @@
 
 #include <vector>
 
+#include "compact/sheet_cloud_for_test.h"
 #include "core/spherical_harmonics.h"
-#include "model/compact/sheet_cloud_for_test.h"
 #include "render/rasterizer.h"
 
 namespace anchorsplat {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/result.h"
-#include "model/shared/torch/network_options.h"
+#include "network/torch/network_options.h"
 #include "perceptual/lpips_net.h"
 
 namespace anchorsplat {

@@ -10,7 +10,7 @@
 #include "core/parallel.h"
 #include "core/run_context.h"
 #include "io/flip_bit_for_test.h"
-#include "model/published/published_checkpoint.h"
+#include "published/published_checkpoint.h"
 #include "tensors/tensor_file.h"
 #include "train/small_training_for_test.h"
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/result.h"
-#include "model/shared/torch/render_op.h"
-#include "model/shared/torch/trainable_network.h"
+#include "network/torch/render_op.h"
+#include "network/torch/trainable_network.h"
 #include "train/perceptual_objective.h"
 #include "train/train_config.h"
 #include "train/train_request.h"

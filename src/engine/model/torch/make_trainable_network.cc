@@ -1,8 +1,8 @@
 #include "model/torch/make_trainable_network.h"
 
+#include "compact/torch/compact_trainable.h"
 #include "core/text.h"
-#include "model/compact/torch/compact_trainable.h"
-#include "model/published/torch/published_trainable.h"
+#include "published/torch/published_trainable.h"
 
 namespace anchorsplat {
 

@@ -4,8 +4,8 @@
 #include <string>
 
 #include "core/result.h"
-#include "model/shared/torch/network_options.h"
-#include "model/shared/torch/trainable_network.h"
+#include "network/torch/network_options.h"
+#include "network/torch/trainable_network.h"
 
 namespace anchorsplat {
 

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "compact/compact_network.h"
+#include "core/result.h"
+
+namespace anchorsplat {
+
+// The networks built into the program from models/ of the source tree (docs/network.md). A build has all or none.
+//   kStandard     anchorsplat-compact.safetensors      splats like standard fits
+//   kClassic      anchorsplat-classic.safetensors      other classic splats
+//   kSingle       anchorsplat-single.safetensors       classic splats, one Gaussian per Gaussian
+//   kAntialiased  anchorsplat-antialiased.safetensors  render modes that compensate the dilation (IsCompensated)
+enum class Shipped { kStandard, kClassic, kSingle, kAntialiased };
+inline constexpr Shipped kAllShipped[] = {Shipped::kStandard, Shipped::kClassic, Shipped::kSingle,
+                                          Shipped::kAntialiased};
+
+bool HasShippedNetwork();
+
+// Identifies the built-in networks: their sizes and a hash of their bytes. Empty without networks.
+std::string ShippedNetworkIdentity();
+
+// Errors: kNotFound in a build without networks; those of LoadCompactNetwork.
+Result<CompactNetwork> LoadShippedNetwork(Shipped which = Shipped::kStandard);
+
+}  // namespace anchorsplat

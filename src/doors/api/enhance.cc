@@ -54,10 +54,9 @@ Result<EnhanceOptions> ToOptions(const EnhanceSettings& settings) {
     for (const PinholeCamera& camera : settings.cameras) options.cameras->cameras.push_back(ToCamera(camera));
   }
   for (const auto& [name, value] : settings.refine) {
-    ANCHORSPLAT_RETURN_IF_ERROR(SetRefineOption(options.refine, name, value));
-    given(true, name == "most-gaussians" ? "max-gaussians" : name.c_str());
+    ANCHORSPLAT_RETURN_IF_ERROR(SetOption(RefinementOptions(), name, value, options));
   }
-  SetBudget(options, options.refine.max_gaussians);  // one budget, wherever it was set
+  SetBudget(options, options.max_gaussians);  // one budget, wherever it was set
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(options.refine));
   return options;
 }

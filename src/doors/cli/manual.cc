@@ -42,7 +42,7 @@ void AddManual(CLI::App& app, Program& program) {
       *app.add_subcommand("manual", "Print the manual page, shell completion, or all verbs and options as JSON");
   verb.group("");
   const auto kind = std::make_shared<std::string>();
-  verb.add_option("kind", *kind, "What to print")->required()->check(CLI::IsMember({"man", "bash", "zsh", "json"}));
+  verb.add_option("kind", *kind, "What to print")->required()->check(OneOf({"man", "bash", "zsh", "json"}));
   verb.callback([kind, &app, &program] {
     program.run = [kind, &app]() -> Status {
       if (*kind == "json") {

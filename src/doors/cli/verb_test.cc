@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <set>
 #include <sstream>
 
 #include "cli/run_for_test.h"
@@ -9,8 +10,8 @@
 #include "cli/table.h"
 #include "cli/verb_tree.h"
 #include "core/text.h"
-#include "enhance/refine_options.h"
 #include "io/folder_for_test.h"
+#include "model/model_method.h"
 
 namespace anchorsplat {
 namespace {
@@ -84,18 +85,25 @@ TEST(CommandLine, HelpOfEnhanceIsShortAndHelpAllHasGroups) {
   }
 }
 
-// What `eval` and the library take by name is what the command line declares.
-TEST(CommandLine, EveryOptionOfRefinementIsOneOfEnhance) {
+// Methods and command line describe the same options, both ways.
+TEST(CommandLine, OptionsOfMethodsAreThoseOfEnhance) {
   const std::vector<DeclaredVerb> verbs = VerbsWithOptions();
   const auto enhance = std::ranges::find_if(verbs, [](const DeclaredVerb& verb) { return verb.name() == "enhance"; });
   ASSERT_NE(enhance, verbs.end());
-  std::istringstream keys(RefineOptionKeys());
-  for (std::string key; keys >> key;) {
-    if (key.ends_with(',')) key.pop_back();
-    EXPECT_TRUE(std::ranges::any_of(enhance->options, [&](const DeclaredOption& option) {
-      return std::ranges::find(option.names, "--" + key) != option.names.end();
-    })) << key;
+  std::set<std::string> declared, declared_for_methods, of_methods;
+  for (const DeclaredOption& option : enhance->options) {
+    for (const std::string& name : option.names) {
+      declared.insert(name);
+      if (option.group == "Refinement" || option.group.find("etwork") != std::string::npos) {
+        declared_for_methods.insert(name);
+      }
+    }
   }
+  for (const EnhanceMethod& method : AllMethods()) {
+    for (const MethodOption& option : method.options) of_methods.insert("--" + option.name);
+  }
+  for (const std::string& name : of_methods) EXPECT_TRUE(declared.contains(name)) << name;
+  for (const std::string& name : declared_for_methods) EXPECT_TRUE(of_methods.contains(name)) << name;
 }
 
 TEST(CommandLine, HelpAllOfTheProgramHasEveryVerb) {
@@ -115,6 +123,10 @@ TEST(CommandLine, WordsThatAreNoVerb) {
   EXPECT_EQ(ExpectRefused({"enhance", "--json"}, ErrorCode::kBadArgument).json()["error"]["code"], "bad_argument");
   ExpectRefused({"info", "x.ply", "--colour"}, ErrorCode::kBadArgument, {"--colour", "--help shows how"});
   ExpectRefused({"enhance", "--upscal", "4"}, ErrorCode::kBadArgument, {"did you mean '--upscale'?"});
+  ExpectRefused({"enhance", "x.ply", "-o", "y.ply", "--quality", "bst"}, ErrorCode::kBadArgument,
+                {"--quality: must be fast, good or best, found 'bst'; did you mean 'best'?"});
+  ExpectRefused({"enhance", "x.ply", "-o", "y.ply", "--precision", "double"}, ErrorCode::kBadArgument,
+                {"must be fp32 or bf16, found 'double' (--help"});
 }
 
 // Finite ones, whatever the option; whole ones have 64 bits. The message names the option and stays readable.

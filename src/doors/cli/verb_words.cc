@@ -4,6 +4,7 @@
 
 #include "cli/verb_tree.h"
 #include "core/text.h"
+#include "request/choice.h"
 
 namespace anchorsplat {
 
@@ -16,19 +17,6 @@ std::vector<std::string> Verbs(const CLI::App& app) {
     verbs.push_back(verb->get_name());
   }
   return verbs;
-}
-
-// Empty if none is near: half of the letters may differ.
-std::string Nearest(const std::string& word, const std::vector<std::string>& known) {
-  std::string best;
-  size_t least = std::string::npos;
-  for (const std::string& one : known) {
-    const size_t distance = EditDistance(word, one);
-    if (2 * distance > std::max(word.size(), one.size()) + 1 || distance >= least) continue;
-    best = one;
-    least = distance;
-  }
-  return best;
 }
 
 // Without dashes.
@@ -102,22 +90,6 @@ std::vector<std::string> WithLongNames(const CLI::App& app, std::span<const std:
     if (option != nullptr && !option->get_lnames().empty()) word = Cat("--", option->get_lnames()[0], word.substr(2));
   }
   return said;
-}
-
-size_t EditDistance(std::string_view a, std::string_view b) {
-  // Optimal string alignment: rows of the table for the last two letters of `a` are enough.
-  std::vector<size_t> before, last, now(b.size() + 1);
-  for (size_t j = 0; j <= b.size(); ++j) now[j] = j;
-  for (size_t i = 1; i <= a.size(); ++i) {
-    before = std::move(last);
-    last = std::move(now);
-    now.assign(b.size() + 1, i);
-    for (size_t j = 1; j <= b.size(); ++j) {
-      now[j] = std::min({last[j] + 1, now[j - 1] + 1, last[j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1)});
-      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) now[j] = std::min(now[j], before[j - 2] + 1);
-    }
-  }
-  return now[b.size()];
 }
 
 }  // namespace anchorsplat

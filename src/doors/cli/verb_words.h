@@ -22,7 +22,4 @@ std::string UnknownOption(const CLI::App& app, std::span<const std::string> word
 // flag, as another flag.
 std::vector<std::string> WithLongNames(const CLI::App& app, std::span<const std::string> words);
 
-// Number of letters to change, add, remove or swap with their neighbour to turn `a` into `b`.
-size_t EditDistance(std::string_view a, std::string_view b);
-
 }  // namespace anchorsplat

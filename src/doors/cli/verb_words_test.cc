@@ -4,6 +4,8 @@
 
 #include <vector>
 
+#include "request/choice.h"
+
 namespace anchorsplat {
 namespace {
 

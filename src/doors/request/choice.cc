@@ -1,11 +1,14 @@
 #include "request/choice.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <limits>
 
+#include "core/text.h"
+#include "enhance/method_option.h"
 #include "request/parse.h"
 
 namespace anchorsplat {
@@ -46,6 +49,45 @@ CLI::Validator Whole(bool negative_too) {
 }
 
 }  // namespace
+
+size_t EditDistance(std::string_view a, std::string_view b) {
+  // Optimal string alignment: rows of the table for the last two letters of `a` are enough.
+  std::vector<size_t> before, last, now(b.size() + 1);
+  for (size_t j = 0; j <= b.size(); ++j) now[j] = j;
+  for (size_t i = 1; i <= a.size(); ++i) {
+    before = std::move(last);
+    last = std::move(now);
+    now.assign(b.size() + 1, i);
+    for (size_t j = 1; j <= b.size(); ++j) {
+      now[j] = std::min({last[j] + 1, now[j - 1] + 1, last[j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1)});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) now[j] = std::min(now[j], before[j - 2] + 1);
+    }
+  }
+  return now[b.size()];
+}
+
+std::string Nearest(const std::string& word, const std::vector<std::string>& known) {
+  std::string best;
+  size_t least = std::string::npos;
+  for (const std::string& one : known) {
+    const size_t distance = EditDistance(word, one);
+    if (2 * distance > std::max(word.size(), one.size()) + 1 || distance >= least) continue;
+    best = one;
+    least = distance;
+  }
+  return best;
+}
+
+CLI::Validator OneOf(const std::vector<std::string>& words) {
+  return CLI::Validator(
+      [words](const std::string& text) {
+        if (std::ranges::find(words, text) != words.end()) return std::string();
+        const std::string nearest = Nearest(text, words);
+        return Cat("must be ", OrList(words), ", found '", Printable(text), "'",
+                   !nearest.empty() ? Cat("; did you mean '", nearest, "'?") : "");
+      },
+      "{" + CLI::detail::join(words, ",") + "}");
+}
 
 CLI::Validator MemorySize() {
   return CLI::Validator(

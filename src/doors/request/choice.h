@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -55,6 +56,14 @@ inline CLI::Validator Fraction() {
       "");
 }
 
+// Number of letters to change, add, remove or swap with their neighbour to turn `a` into `b`.
+size_t EditDistance(std::string_view a, std::string_view b);
+// The known word that `word` may stand for; empty if none is near: half of the letters may differ.
+std::string Nearest(const std::string& word, const std::vector<std::string>& known);
+
+// For words. CLI11's own check names no near one.
+CLI::Validator OneOf(const std::vector<std::string>& words);
+
 // For an amount of memory: turns "2G" into bytes (ParseMemory in request/parse.h).
 CLI::Validator MemorySize();
 
@@ -77,7 +86,7 @@ CLI::Option* AddChoice(CLI::App& verb, const std::string& name, Enum& value,
       if (known == word) value = meaning;
     }
   };
-  return verb.add_option_function<std::string>(name, assign, help)->check(CLI::IsMember(words))->default_str(now);
+  return verb.add_option_function<std::string>(name, assign, help)->check(OneOf(words))->default_str(now);
 }
 
 }  // namespace anchorsplat

@@ -37,13 +37,13 @@ void ConvertFlags::AddTo(CLI::App& verb) {
       ->type_name("AXES")
       ->check(NotEmpty());
   verb.add_option("--scales", scales, "How the input stores scales, if not as its format requires")
-      ->check(CLI::IsMember({"logarithms", "lengths"}))
+      ->check(OneOf({"logarithms", "lengths"}))
       ->capture_default_str();
   verb.add_option("--opacities", opacities, "How the input stores opacities, if not as its format requires")
-      ->check(CLI::IsMember({"logits", "0-1"}))
+      ->check(OneOf({"logits", "0-1"}))
       ->capture_default_str();
   verb.add_option("--colors", colors, "How the input stores f_dc: as harmonics, or as colours 0-1 or 0-255")
-      ->check(CLI::IsMember({"harmonics", "0-1", "0-255"}))
+      ->check(OneOf({"harmonics", "0-1", "0-255"}))
       ->capture_default_str();
   edits.AddTo(verb);
   double_means = verb.add_flag("--double", options.double_means,

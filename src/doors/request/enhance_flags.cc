@@ -1,20 +1,18 @@
 #include "request/enhance_flags.h"
 
-#include <array>
-#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <tuple>
+#include <type_traits>
 
 #include "cameras/camera_io.h"
 #include "core/text.h"
 #include "enhance/gaussian_budget.h"
 #include "model/model_method.h"
+#include "model/network_options.h"
 #include "request/choice.h"
 #include "request/findings.h"
 #include "request/mode_option.h"
 #include "request/parse.h"
-#include "request/refine_flags.h"
 
 namespace anchorsplat {
 
@@ -34,37 +32,6 @@ nlohmann::json ToJson(const RefinePlan& plan) {
   return json;
 }
 
-// "identity", the seed of PyTorch's generator, or five permutations such as 1230,0321,1023,3102,0321.
-Result<Shuffles> ParseShuffles(const std::string& text) {
-  if (text == "identity") return kNoShuffles;
-  Shuffles shuffles;
-  constexpr size_t kWidth = std::tuple_size_v<Shuffle> + 1;  // digits and a comma
-  if (text.size() + 1 == kWidth * shuffles.size()) {
-    bool well_formed = true;
-    for (size_t i = 0; i < text.size(); ++i) {
-      const bool comma = i % kWidth == kWidth - 1;
-      well_formed &= comma ? text[i] == ',' : text[i] >= '0' && text[i] <= '9';
-      if (!comma) shuffles[i / kWidth][i % kWidth] = static_cast<uint8_t>(text[i] - '0');
-    }
-    if (well_formed && Validate(shuffles).ok()) return shuffles;
-  }
-  uint64_t seed = 0;
-  const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), seed);
-  if (code == std::errc() && end == text.data() + text.size()) return ShufflesFromSeed(seed);
-  return Error{ErrorCode::kBadArgument,
-               Cat("--shuffles: '", Printable(text),
-                   "' is neither 'identity', nor a seed, nor five permutations such as 1230,0321,1023,3102,0321")};
-}
-
-// Options of networks.
-Status FinishModelOptions(const EnhanceFlags& flags, ModelSettings& model) {
-  model.file = flags.model_file;
-  model.options.upstream = flags.compat == "upstream";
-  ANCHORSPLAT_ASSIGN_OR_RETURN(model.copies, ParseCopies("--copies", flags.copies));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(model.options.shuffles, ParseShuffles(flags.shuffles));
-  return {};
-}
-
 std::string MethodHelp() {
   std::string text = "auto: the best for what is given";
   for (const EnhanceMethod& method : AllMethods()) text += "; " + method.name + ": " + method.summary;
@@ -78,7 +45,7 @@ void AddMethodFlags(CLI::App& verb, EnhanceFlags& flags) {
                   "How much time to spend. fast: filter or network, about a second. good: then a short refinement, "
                   "several seconds. best: refinement against --images, or without them at the closer view's "
                   "resolution, minutes. Replaces --method")
-      ->check(CLI::IsMember({"fast", "good", "best"}));
+      ->check(OneOf({"fast", "good", "best"}));
   verb.add_option("--upscale", options.upscale, "Zoom to prepare for; at least 1")->capture_default_str();
   verb.add_option("--max-gaussians,--most-gaussians", options.max_gaussians,
                   "Budget for the output, spent where the closer view shows it; 0: no limit. With a published network: "
@@ -124,68 +91,58 @@ void AddPixelSizeFlags(CLI::App& verb, EnhanceFlags& flags) {
       ->group(group);
 }
 
-void AddNetworkFlags(CLI::App& verb, EnhanceFlags& flags) {
-  const std::string group = "Network";
-  PublishedOptions& model = flags.options.model.options;
-  verb.add_option("--model", flags.model_file, "Weights of a compact or AnchorSplat network, .safetensors or .pth")
-      ->type_name("FILE")
-      ->check(NotEmpty())
-      ->group(group);
-  verb.add_option("--copies", flags.copies,
-                  "Most Gaussians that a compact network makes of each; auto: fewer where the difference is invisible")
-      ->type_name("N")
-      ->capture_default_str()
-      ->group(group);
-  verb.add_option("--merge-cost", flags.options.model.merge_cost,
-                  "With --copies auto: most error per merged Gaussian, in closer-view pixels x squared difference "
-                  "(default: 0.001 for standard fits, else 0.0001)")
-      ->check(NotNegative())
-      ->group(group);
-  verb.add_option("--prune-opacity", model.prune_opacity,
-                  "Drop network output fainter than this; 1/255 = 0.0039 is invisible")
-      ->check(Fraction())
-      ->capture_default_str()
-      ->group(group);
-  verb.add_option("--block-gaussians", model.block_gaussians,
-                  "Enhance larger splats in overlapping blocks of this size")
-      ->check(CLI::Range(int64_t{1000}, int64_t{100'000'000}))
-      ->capture_default_str()
-      ->group(group);
-  AddChoice(verb, "--precision", flags.options.model.precision,
-            {{"fp32", WeightPrecision::kFloat}, {"bf16", WeightPrecision::kBFloat16}},
-            "Of matrix products, convolutions and attention; bf16 needs processor support (`doctor` reports it)")
-      ->group(group);
+CLI::Validator InRange(const OptionRange& range, bool whole) {
+  std::string shown;  // in the help
+  if (range.greatest == OptionRange().greatest) {
+    if (range.least == 0) shown = range.above_least ? "POSITIVE" : "NONNEGATIVE";
+  } else if (whole) {
+    shown = Cat("INT in [", static_cast<int64_t>(range.least), " - ", static_cast<int64_t>(range.greatest), "]");
+  }
+  return CLI::Validator(
+      [range, whole](const std::string& text) {
+        double number = 0;
+        const bool fits = CLI::detail::lexical_cast(text, number) && Contains(range, number);
+        return fits ? "" : Cat("must be ", Describe(range, whole), ", found '", text, "'");
+      },
+      shown);
 }
 
-// Differences of the published script.
-void AddPublishedScriptFlags(CLI::App& verb, EnhanceFlags& flags) {
-  const std::string group = "Published network, as its script runs it";
-  PublishedOptions& model = flags.options.model.options;
-  verb.add_option("--compat", flags.compat,
-                  "upstream: repeat the published script, quirks included; its fp16 attention is "
-                  "--attention-rounding fp16")
-      ->check(CLI::IsMember({"upstream"}))
-      ->group(group);
-  AddChoice(verb, "--normalisation", model.normalisation,
-            {{"auto", NormalisationMode::kAuto},
-             {"centered", NormalisationMode::kCentered},
-             {"bbox", NormalisationMode::kBbox},
-             {"unit", NormalisationMode::kUnit}},
-            "How to fit the splat into the network's unit cube")
-      ->group(group);
-  AddChoice(verb, "--attention-rounding", model.rounding,
-            {{"none", Rounding::kNone}, {"fp16", Rounding::kHalf}, {"bf16", Rounding::kBFloat16}},
-            "Rounding of queries, keys, values and probabilities; the release uses fp16")
-      ->group(group);
-  AddChoice(verb, "--curve-depth", model.depth_rule,
-            {{"v1.5", DepthRule::kLargest}, {"v1.6", DepthRule::kLargestPlusOne}},
-            "Bits of the space-filling curves, by Pointcept release")
-      ->group(group);
-  verb.add_option("--shuffles", flags.shuffles,
-                  "Order of the space-filling curves: identity, a PyTorch seed, or five permutations")
-      ->type_name("ORDER")
-      ->capture_default_str()
-      ->group(group);
+CLI::Option* AddWord(CLI::App& verb, const std::string& name, const WordOption& word, const std::string& help) {
+  const auto set = [word, name](const std::string& text) {
+    const Status status = word.set(text);
+    if (!status.ok()) throw CLI::ValidationError(name, status.error().message);
+  };
+  CLI::Option* option = verb.add_option_function<std::string>(name, set, help)->default_str(word.now);
+  return word.choices.empty() ? option : option->check(OneOf(word.choices));
+}
+
+// Declares what is described, except what `verb` has already. Values go into `options`.
+void AddMethodOptions(CLI::App& verb, const std::string& group, const std::vector<MethodOption>& described,
+                      EnhanceOptions& options) {
+  for (const MethodOption& row : described) {
+    const std::string name = "--" + row.name;
+    if (!row.value || verb.get_option_no_throw(name) != nullptr) continue;
+    OptionValue value = row.value(options);
+    CLI::Option* option = std::visit(
+        [&]<class Value>(Value& to) -> CLI::Option* {
+          using T = std::remove_pointer_t<Value>;
+          if constexpr (std::is_same_v<Value, WordOption>) {
+            return AddWord(verb, name, to, row.help);
+          } else if constexpr (std::is_same_v<T, bool>) {
+            return verb.add_flag(name, *to, row.help);
+          } else if constexpr (std::is_same_v<T, std::filesystem::path>) {
+            const auto set = [to](const std::string& text) { *to = text; };
+            return verb.add_option_function<std::string>(name, set, row.help)->type_name("FILE")->check(NotEmpty());
+          } else {
+            constexpr bool whole = !std::is_floating_point_v<T> && !std::is_same_v<T, std::optional<double>>;
+            CLI::Option* number = verb.add_option(name, *to, row.help)->check(InRange(row.range, whole));
+            return std::is_arithmetic_v<T> ? number->capture_default_str() : number;
+          }
+        },
+        value);
+    if (!row.type.empty()) option->type_name(row.type);
+    option->group(group);
+  }
 }
 
 }  // namespace
@@ -200,15 +157,16 @@ void EnhanceFlags::AddTo(CLI::App& verb) {
                   "Background of the training views for --clean and refinement, R,G,B from 0 to 1 (default: from the "
                   "camera file, else the splat's comment, else black)")
       ->type_name("R,G,B");
-  AddNetworkFlags(verb, *this);
-  AddPublishedScriptFlags(verb, *this);
-  AddRefineFlags(verb, options.refine, options.control);
+  AddMethodOptions(verb, "Network", NetworkOptions(), options);
+  AddMethodOptions(verb, "Published network, as its script runs it", PublishedScriptOptions(), options);
+  AddMethodOptions(verb, "Refinement", RefinementOptions(), options);
+  AddMethodOptions(verb, "Refinement", CheckpointOptions(), options);
+  verb.get_option("--seconds")->excludes(verb.get_option("--steps"));
 }
 
 Result<EnhanceOptions> MakeEnhanceOptions(const EnhanceFlags& flags, uint64_t seed, const CameraSet* cameras) {
   EnhanceOptions options = flags.options;
   options.methods = &AllMethods();
-  ANCHORSPLAT_RETURN_IF_ERROR(FinishModelOptions(flags, options.model));
   SetBudget(options, options.max_gaussians);
   if (!flags.region.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(options.region, ParseRegion("--region", flags.region));

@@ -17,11 +17,7 @@ namespace anchorsplat {
 struct EnhanceFlags {
   EnhanceOptions options;
   std::string pixel_size = "auto";
-  std::string cameras;  // file or folder
-  std::string model_file;
-  std::string shuffles = "identity";
-  std::string compat;
-  std::string copies = "auto";
+  std::string cameras;             // file or folder
   std::optional<RenderMode> mode;  // overrides the splat's tag
   std::string background;          // for --clean and refinement
   std::string region;

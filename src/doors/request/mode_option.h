@@ -14,7 +14,7 @@ inline CLI::Option* AddModeOption(CLI::App& verb, std::optional<RenderMode>& mod
   std::vector<std::string> words;
   for (const RenderMode known : kRenderModes) words.emplace_back(NameOf(known));
   const auto assign = [&mode](const std::string& word) { mode = RenderModeNamed(word); };
-  return verb.add_option_function<std::string>("--mode", assign, help)->check(CLI::IsMember(words));
+  return verb.add_option_function<std::string>("--mode", assign, help)->check(OneOf(words));
 }
 
 }  // namespace anchorsplat

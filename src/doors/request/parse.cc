@@ -116,15 +116,6 @@ Result<std::array<double, 3>> ParseDirection(const std::string& option, const st
   return Error{ErrorCode::kBadArgument, Cat(option, ": '", Printable(text), "' is not ", kForm)};
 }
 
-Result<std::optional<int64_t>> ParseCopies(const std::string& option, const std::string& text) {
-  if (text == "auto") return std::optional<int64_t>();
-  const auto number = ParseNumber(text);
-  if (!number || !(*number >= 1) || *number > 64 || *number != std::floor(*number)) {
-    return Error{ErrorCode::kBadArgument, Cat(option, ": '", Printable(text), "' is neither 'auto' nor 1, 2, 3, …")};
-  }
-  return std::optional<int64_t>(static_cast<int64_t>(*number));
-}
-
 Result<std::optional<double>> ParsePixelSize(const std::string& option, const std::string& text) {
   if (text == "auto") return std::optional<double>();
   const auto number = ParseNumber(text);

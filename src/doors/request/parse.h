@@ -32,8 +32,6 @@ inline constexpr const char* kInputFormatHelp =
 // "2G", "500M", "0.5G", "1GiB" or a number of bytes. kBadArgument: invalid, or below kLeastMemory.
 Result<uint64_t> ParseMemory(const std::string& text);
 inline constexpr uint64_t kLeastMemory = 64'000'000;  // bytes
-// A whole number of at least 1; unset for "auto".
-Result<std::optional<int64_t>> ParseCopies(const std::string& option, const std::string& text);
 // A positive number; unset for "auto".
 Result<std::optional<double>> ParsePixelSize(const std::string& option, const std::string& text);
 

@@ -117,7 +117,7 @@ void ViewFlags::AddTo(CLI::App& verb) {
   verb.add_option("--far", far_plane, "Far plane, world units (default: none)");
   AddModeOption(verb, mode, "Rasterization (default: the file's tag, else classic)");
   verb.add_option("--profile", profile, "Cut-off of a Gaussian: 3 sigma as in gsplat 1.0-1.4, or by opacity as in 1.5")
-      ->check(CLI::IsMember({"gsplat14", "gsplat15"}))
+      ->check(OneOf({"gsplat14", "gsplat15"}))
       ->capture_default_str();
 }
 

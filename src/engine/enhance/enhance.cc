@@ -83,7 +83,7 @@ const EnhanceMethod& FilterMethod() {
       .options =
           [] {
             std::vector<MethodOption> options = WidthOptions();
-            options.push_back({"max-gaussians", {}});
+            options.push_back(BudgetOption());
             return options;
           }(),
       .expected_gaussians = [](int64_t count, const EnhanceOptions& options) -> int64_t {

@@ -15,6 +15,7 @@
 #include "core/gaussian_cloud.h"
 #include "core/region.h"
 #include "core/result.h"
+#include "enhance/method_option.h"
 #include "enhance/model_settings.h"
 #include "enhance/pixel_size.h"
 #include "enhance/refine_options.h"
@@ -22,8 +23,6 @@
 #include "reading/reading.h"
 
 namespace anchorsplat {
-
-struct EnhanceMethod;
 
 // Input of every method. The cloud is in stored space, lengths are in world units.
 struct EnhanceOptions {
@@ -144,19 +143,6 @@ struct EnhanceInput {
   bool is_refined = false;        // refinement follows this method
 };
 
-// The context in which a method will run.
-struct MethodUse {
-  const EnhanceOptions& options;
-  const EnhanceMethod* start = nullptr;  // the method before it, or null
-};
-
-// An option that affects a method.
-struct MethodOption {
-  std::string name;  // as in EnhanceOptions::given
-  // What the option still requires, as the end of "it works only …": "with --images". Null or empty result: nothing.
-  std::function<std::string(const MethodUse&)> lacks;
-};
-
 // A way to enhance. `ready` reports whether it can run with these options alone (weights present, images given, …);
 // "auto" considers only ready ones. Higher `rank` is better.
 struct EnhanceMethod {
@@ -190,8 +176,10 @@ const EnhanceMethod& FilterMethod();
 const std::vector<EnhanceMethod>& BasicMethods();
 const std::vector<EnhanceMethod>& MethodsOf(const EnhanceOptions& options);
 
-// The options --upscale, pixel sizes and filter strength.
+// --upscale, pixel sizes and filter strength.
 std::vector<MethodOption> WidthOptions(const std::function<std::string(const MethodUse&)>& lacks = {});
+// --max-gaussians.
+MethodOption BudgetOption();
 
 // The methods chosen by `method` and `quality`.
 struct MethodPlan {

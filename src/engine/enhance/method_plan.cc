@@ -68,12 +68,6 @@ Result<MethodPlan> PlanQuality(const EnhanceOptions& options) {
   return plan;
 }
 
-std::string OrList(const std::vector<std::string>& words) {
-  std::string list;
-  for (size_t i = 0; i < words.size(); ++i) list += (i == 0 ? "" : i + 1 == words.size() ? " or " : ", ") + words[i];
-  return list;
-}
-
 const MethodOption* FindOption(const EnhanceMethod* method, const std::string& name) {
   if (method == nullptr) return nullptr;
   const auto named = [&](const MethodOption& option) { return option.name == name; };
@@ -90,9 +84,14 @@ bool IsGiven(const EnhanceOptions& options, std::string_view name) {
 std::vector<MethodOption> WidthOptions(const std::function<std::string(const MethodUse&)>& lacks) {
   std::vector<MethodOption> options;
   for (const char* name : {"upscale", "pixel-size", "cameras", "train-width", "camera-rule", "filter-strength"}) {
-    options.push_back({name, lacks});
+    options.push_back({.name = name, .lacks = lacks});
   }
   return options;
+}
+
+MethodOption BudgetOption() {
+  return {"max-gaussians", [](EnhanceOptions& options) -> OptionValue { return &options.max_gaussians; }, "",
+          kZeroOrMore};
 }
 
 std::string MethodPlan::Name() const { return start == nullptr ? method->name : Cat(start->name, "+", method->name); }

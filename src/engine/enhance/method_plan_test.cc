@@ -38,19 +38,20 @@ class Plan : public testing::Test {
   EnhanceOptions options_;
   const std::vector<EnhanceMethod> methods_ = [] {
     std::vector<EnhanceMethod> methods = BasicMethods();
-    methods.push_back({.name = "sharpen",
-                       .summary = "for this test",
-                       .rank = 1,
-                       .adds_detail = true,
-                       .options = {{"prune-opacity", {}},
-                                   {"block-gaussians", [](const MethodUse&) { return "with a larger network"; }}},
-                       .ready = [](const EnhanceOptions& options) -> Status {
-                         if (options.seed == kWithNetwork) return {};
-                         return Error{ErrorCode::kBadArgument, "no network"};
-                       },
-                       .run = [](EnhanceInput input, const EnhanceOptions&, StepReport&) -> Result<GaussianCloud> {
-                         return std::move(input.cloud);
-                       }});
+    methods.push_back(
+        {.name = "sharpen",
+         .summary = "for this test",
+         .rank = 1,
+         .adds_detail = true,
+         .options = {{"prune-opacity", {}},
+                     {.name = "block-gaussians", .lacks = [](const MethodUse&) { return "with a larger network"; }}},
+         .ready = [](const EnhanceOptions& options) -> Status {
+           if (options.seed == kWithNetwork) return {};
+           return Error{ErrorCode::kBadArgument, "no network"};
+         },
+         .run = [](EnhanceInput input, const EnhanceOptions&, StepReport&) -> Result<GaussianCloud> {
+           return std::move(input.cloud);
+         }});
     return methods;
   }();
 };

@@ -106,50 +106,33 @@ Result<GaussianCloud> RunEnlarged(EnhanceInput input, const EnhanceOptions& opti
   return RunRefine(std::move(input), options, true, report);
 }
 
-bool HasImages(const MethodUse& use) { return !use.options.refine.images.empty(); }
-bool HasCameras(const MethodUse& use) { return use.options.cameras.has_value(); }
-
 // Options that affect refinement, in both its methods.
-std::vector<MethodOption> RefinementOptions() {
-  const auto with_images = [](const MethodUse& use) { return HasImages(use) ? "" : "with --images"; };
+std::vector<MethodOption> OptionsOfRefinement() {
   const auto filtered = [](const MethodUse& use) {
     return use.start == nullptr ? "" : "with a --method that uses the filter";
   };
-  const auto closer = [](const MethodUse& use) { return use.options.upscale > 1 ? "" : "with --upscale above 1"; };
-  const auto for_steps = [](const MethodUse& use) { return use.options.refine.seconds ? "without --seconds" : ""; };
-  return {
-      {"upscale", {}},
-      {"pixel-size", [=](const MethodUse& use) { return HasImages(use) || HasCameras(use) ? filtered(use) : ""; }},
-      {"cameras", [=](const MethodUse& use) { return HasImages(use) ? filtered(use) : ""; }},
-      {"train-width", filtered},
-      {"camera-rule", filtered},
-      {"filter-strength", filtered},
-      {"images", {}},
-      {"background", {}},
-      {"hold-out", with_images},
-      {"downscale", with_images},
-      {"steps", {}},
-      {"seconds", {}},
-      {"k", {}},
-      {"max-gaussians", {}},
-      {"poses",
-       [](const MethodUse& use) { return HasImages(use) || HasCameras(use) ? "without --images and --cameras" : ""; }},
-      {"between",
-       [](const MethodUse& use) {
-         return HasImages(use) || !HasCameras(use) ? "with --cameras, without --images" : "";
-       }},
-      {"half-from", closer},
-      {"all-from", closer},
-      {"rate", {}},
-      {"rate-decay", {}},
-      {"ssim-weight", {}},
-      {"exposure", with_images},
-      {"robust", with_images},
-      {"align", with_images},
-      {"checkpoint", for_steps},
-      {"checkpoint-every", for_steps},
-      {"resume", for_steps},
+  const auto beside_images = [filtered](const MethodUse& use) {
+    return use.options.refine.images.empty() ? "" : filtered(use);
   };
+  std::vector<MethodOption> options = WidthOptions(filtered);
+  for (MethodOption& option : options) {
+    if (option.name == "upscale") option.lacks = {};
+    if (option.name == "cameras") option.lacks = beside_images;
+    if (option.name == "pixel-size") {
+      option.lacks = [=](const MethodUse& use) { return use.options.cameras ? filtered(use) : beside_images(use); };
+    }
+  }
+  options.push_back({"background"});
+  for (const auto& more : {RefinementOptions(), CheckpointOptions()}) {
+    options.insert(options.end(), more.begin(), more.end());
+  }
+  return options;
+}
+
+std::vector<MethodOption> Without(const char* ending) {
+  std::vector<MethodOption> options = OptionsOfRefinement();
+  std::erase_if(options, [&](const MethodOption& option) { return option.name.ends_with(ending); });
+  return options;
 }
 
 bool WithPictures(const EnhanceOptions& options) { return !options.refine.images.empty(); }
@@ -169,7 +152,7 @@ EnhanceMethod RefineMethod() {
           .takes_start = true,
           .starts_from_best = WithPictures,
           .is_checkpoint = IsFitCheckpoint,
-          .options = RefinementOptions(),
+          .options = Without("enlarge-with"),
           .expected_gaussians = Expected,
           .ready = [](const EnhanceOptions& options) { return Validate(options.refine); },
           .run = RunPlain};
@@ -194,9 +177,6 @@ Status CheckDetail(const EnhanceOptions& options) {
 }  // namespace
 
 EnhanceMethod DetailMethod() {
-  std::vector<MethodOption> looked_at = RefinementOptions();
-  std::erase_if(looked_at, [](const MethodOption& option) { return option.name.ends_with("-from"); });  // uses all rays
-  looked_at.push_back({"enlarge-with", {}});
   return {.name = "detail",
           .summary =
               "refine against views at the closer view's resolution; minutes. With --enlarge-with it invents "
@@ -206,7 +186,7 @@ EnhanceMethod DetailMethod() {
           .starts_from_best = [](const EnhanceOptions&) { return true; },
           .invents = [](const EnhanceOptions& options) { return !options.refine.enlarge_with.empty(); },
           .is_checkpoint = IsFitCheckpoint,
-          .options = std::move(looked_at),
+          .options = Without("-from"),  // uses all rays
           .expected_gaussians = Expected,
           .ready = CheckDetail,
           .run = RunEnlarged};
@@ -219,7 +199,7 @@ EnhanceMethod RefineImagesMethod() {
           .takes_start = true,
           .starts_from_best = WithPictures,
           .is_checkpoint = IsFitCheckpoint,
-          .options = RefinementOptions(),
+          .options = Without("enlarge-with"),
           .expected_gaussians = Expected,
           .ready = [](const EnhanceOptions& options) -> Status {
             if (!options.refine.images.empty()) return Validate(options.refine);

@@ -5,11 +5,11 @@
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "core/result.h"
 #include "core/world_origin.h"
+#include "enhance/method_option.h"
 
 namespace anchorsplat {
 
@@ -75,18 +75,12 @@ struct RefinePlan {
 
 inline constexpr int kMostCopies = 64;
 
+// Every option of RefineOptions and RefineControl that users can set.
+const std::vector<MethodOption>& RefinementOptions();
+const std::vector<MethodOption>& CheckpointOptions();
+
 // kBadArgument, naming the option, for values that cannot be run.
 Status Validate(const RefineOptions& options);
-
-// Sets the option with command-line name `key` ("k" for `--k`) to `value`: a number, or 0 or 1 for switches. Does not
-// cover `images` and the control. Validate checks combinations.
-//
-// Errors (kBadArgument): an unknown key (lists the known ones); a value that is no number, or not an integer where one
-// is required.
-Status SetRefineOption(RefineOptions& options, std::string_view key, std::string_view value);
-
-// The keys of SetRefineOption, separated by commas.
-std::string RefineOptionKeys();
 
 // Increased whenever the same options give another result.
 inline constexpr int kRefineRevision = 2;

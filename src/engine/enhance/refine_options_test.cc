@@ -3,8 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <set>
 #include <string>
-#include <string_view>
+#include <type_traits>
+#include <variant>
+
+#include "enhance/count_members_for_test.h"
+#include "enhance/enhance.h"
 
 namespace anchorsplat {
 namespace {
@@ -30,35 +35,71 @@ TEST(RefineOptions, RefusesNonsense) {
 }
 
 TEST(RefineOptions, AreSetByName) {
-  RefineOptions o;
-  const auto set = [&](std::string_view key, std::string_view value) {
-    const Status status = SetRefineOption(o, key, value);
+  EnhanceOptions options;
+  const RefineOptions& o = options.refine;
+  const auto set = [&](const std::string& key, const std::string& value) {
+    const Status status = SetOption(RefinementOptions(), key, value, options);
     return status.ok() ? std::string() : status.error().message;
   };
+  for (const MethodOption& option : RefinementOptions()) EXPECT_EQ(set(option.name, "1"), "") << option.name;
+  EXPECT_EQ(options.given.size(), RefinementOptions().size());
+  EXPECT_EQ(o.images, "1");
+  EXPECT_EQ(o.poses, 1);
+  EXPECT_EQ(o.hold_out, 1);
+  EXPECT_EQ(options.max_gaussians, 1);
+  EXPECT_EQ(o.seconds, 1);
+  EXPECT_TRUE(o.robust);
   EXPECT_EQ(set("k", "3"), "");
   EXPECT_EQ(o.copies, 3);
   EXPECT_EQ(set("steps", "1e3"), "");
   EXPECT_EQ(o.steps, 1000);
   EXPECT_EQ(set("half-from", "0.125"), "");
   EXPECT_EQ(o.half_from, 0.125);
-  EXPECT_EQ(set("robust", "1"), "");
-  EXPECT_TRUE(o.robust);
-  // Every key is understood by the name that the list has for it.
-  std::string keys = RefineOptionKeys() + ", ";
-  for (size_t at = 0, end; at < keys.size(); at = end + 2) {
-    end = keys.find(", ", at);
-    EXPECT_EQ(set(keys.substr(at, end - at), "1"), "") << keys.substr(at, end - at);
-  }
-  EXPECT_EQ(o.poses, 1);
-  EXPECT_EQ(o.hold_out, 1);
-  EXPECT_EQ(o.max_gaussians, 1);
-  EXPECT_EQ(o.seconds, 1);
+  EXPECT_EQ(set("most-gaussians", "7"), "") << "the former name";
+  EXPECT_EQ(options.max_gaussians, 7);
 
-  EXPECT_THAT(set("speed", "1"), HasSubstr("no option 'speed' (known: steps, "));
-  EXPECT_THAT(set("k", "2.5"), HasSubstr("k cannot be '2.5'"));
+  EXPECT_THAT(set("speed", "1"), HasSubstr("no option 'speed' (known: images, "));
+  EXPECT_EQ(set("k", "2.5"), "k cannot be '2.5': it must be a whole number from 1 to 64");
+  EXPECT_EQ(set("rate", "0"), "rate cannot be '0': it must be a number above 0");
+  EXPECT_EQ(set("max-gaussians", "-1"), "max-gaussians cannot be '-1': it must be a whole number of 0 or more");
   for (const char* value : {"", "x", "1x", "nan", "1e30", "-1e30", " 1"}) EXPECT_NE(set("k", value), "") << value;
-  EXPECT_NE(set("exposure", "2"), "");
+  EXPECT_EQ(set("exposure", "2"), "exposure cannot be '2': it must be 0 or 1");
+  EXPECT_NE(set("images", ""), "");
   EXPECT_NE(set("", "1"), "");
+  EXPECT_EQ(o.copies, 3) << "a wrong value changes nothing";
+}
+
+// A member without a description fails here, as does a description of another's member.
+TEST(RefineOptions, EachIsDescribedOnce) {
+  constexpr size_t kOthers = 3 + 1;  // set by the program: enlarged, origin, background; outputs
+  EXPECT_EQ(RefinementOptions().size() + CheckpointOptions().size() + kOthers,
+            CountMembers<RefineOptions>() + CountMembers<RefineControl>());
+  EnhanceOptions options;
+  std::set<const void*> places;
+  for (const auto& described : {RefinementOptions(), CheckpointOptions()}) {
+    for (const MethodOption& option : described) {
+      EXPECT_TRUE(option.name == "max-gaussians" || !option.help.empty()) << option.name;
+      const OptionValue value = option.value(options);
+      std::visit(
+          [&](const auto& place) {
+            if constexpr (std::is_pointer_v<std::decay_t<decltype(place)>>) places.insert(place);
+          },
+          value);
+    }
+  }
+  EXPECT_EQ(places.size(), RefinementOptions().size() + CheckpointOptions().size());
+}
+
+// What changes the result is part of a checkpoint.
+TEST(RefineOptions, CheckpointsKnowThemAll) {
+  for (const MethodOption& option : RefinementOptions()) {
+    if (option.name == "seconds" || option.name == "enlarge-with") continue;
+    const char* value = option.name == "downscale" || option.name == "between" ? "2" : "1";
+    EnhanceOptions options;
+    ASSERT_TRUE(SetOption({option}, option.name, value, options).ok());
+    options.refine.max_gaussians = options.max_gaussians;
+    EXPECT_NE(ToJsonText(options.refine), ToJsonText(RefineOptions{})) << option.name;
+  }
 }
 
 }  // namespace

@@ -23,6 +23,7 @@
 #include "io/file_version.h"
 #include "kernels/bfloat16_tile.h"
 #include "model/any_network.h"
+#include "model/network_options.h"
 
 namespace anchorsplat {
 
@@ -33,52 +34,20 @@ constexpr double kStandardVisibleShare = 0.6;
 // Shares from which the log mentions Gaussians unlike training, and warns.
 constexpr double kNotable = 0.01, kMost = 0.5;
 
-// Whether it is certainly a compact network; unreadable files are reported on loading.
-bool IsCompact(const ModelSettings& model) {
-  if (model.file.empty()) return true;  // built into the program
-  const auto compact = HoldsCompactNetwork(model.file);
-  return compact.ok() && *compact;
-}
-bool IsPublished(const ModelSettings& model) {
-  if (model.file.empty()) return false;
-  const auto compact = HoldsCompactNetwork(model.file);
-  return compact.ok() && !*compact;
-}
-
-// Options that apply to each kind of network. Compact ones build on the filter; the published one does not.
-std::vector<MethodOption> NetworkOptions() {
+// Compact networks build on the filter; the published one does not.
+std::vector<MethodOption> OptionsOfNetworks() {
   std::vector<MethodOption> options = WidthOptions([](const MethodUse& use) {
     return IsPublished(use.options.model) ? "with a compact network, --method filter or refine" : "";
   });
-  options.push_back({"model", {}});
-  options.push_back({"prune-opacity", {}});
-  options.push_back({"max-gaussians", {}});
+  options.push_back(BudgetOption());
   for (const char* name : {"checkpoint", "resume"}) {
-    options.push_back(
-        {name, [](const MethodUse& use) { return IsPublished(use.options.model) ? "with a compact network" : ""; }});
-  }
-  for (const char* name : {"copies", "merge-cost"}) {
-    options.push_back({name, [name = std::string(name)](const MethodUse& use) -> std::string {
-                         const ModelSettings& model = use.options.model;
-                         if (IsPublished(model)) return "with a compact network";
-                         return name == "merge-cost" && model.copies ? "with --copies auto" : "";
+    options.push_back({.name = name, .lacks = [](const MethodUse& use) {
+                         return IsPublished(use.options.model) ? "with a compact network" : "";
                        }});
   }
-  const auto published = [](const MethodUse& use) {
-    return IsCompact(use.options.model) ? "with a network of the published architecture (--model FILE)" : "";
-  };
-  for (const char* name : {"compat", "normalisation", "precision", "curve-depth", "shuffles"}) {
-    options.push_back({name, published});
+  for (const auto& more : {NetworkOptions(), PublishedScriptOptions()}) {
+    options.insert(options.end(), more.begin(), more.end());
   }
-  options.push_back({"attention-rounding", [published](const MethodUse& use) -> std::string {
-                       const ModelSettings& model = use.options.model;
-                       const bool none = model.options.rounding == Rounding::kNone;
-                       if (none && model.precision == WeightPrecision::kBFloat16) return "without --precision bf16";
-                       return published(use);
-                     }});
-  options.push_back({"block-gaussians", [published](const MethodUse& use) -> std::string {
-                       return use.options.model.options.upstream ? "without --compat upstream" : published(use);
-                     }});
   return options;
 }
 
@@ -254,7 +223,7 @@ EnhanceMethod ModelMethod() {
       .adds_detail = true,
       .is_checkpoint = IsCompactCheckpoint,
       .checkpoints_on_request = true,
-      .options = NetworkOptions(),
+      .options = OptionsOfNetworks(),
       .needs_pixel_size = [](const EnhanceOptions& options) -> Result<bool> {
         if (options.model.file.empty()) return true;
         return HoldsCompactNetwork(options.model.file);

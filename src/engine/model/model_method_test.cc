@@ -18,8 +18,10 @@
 #include "core/log.h"
 #include "core/random.h"
 #include "core/text.h"
+#include "enhance/count_members_for_test.h"
 #include "enhance/enhance.h"
 #include "kernels/bfloat16_tile.h"
+#include "model/network_options.h"
 #include "published/published_checkpoint_writer.h"
 #include "tensors/safetensors.h"
 
@@ -261,6 +263,21 @@ TEST_F(SmallModel, ChangedFilesAndRunsSideBySideGetTheirNetworks) {
   EXPECT_EQ(copies(three), 2);
 }
 
+// A setting without a description fails here.
+TEST(ModelSettings, EachIsDescribed) {
+  constexpr size_t kOthers = 1 + 2;  // the published network's as a whole; its budget, profile
+  EXPECT_EQ(NetworkOptions().size() + PublishedScriptOptions().size() + kOthers,
+            CountMembers<ModelSettings>() + CountMembers<PublishedOptions>());
+  EnhanceOptions options;
+  EXPECT_TRUE(SetOption(NetworkOptions(), "copies", "3", options).ok());
+  EXPECT_EQ(options.model.copies, 3);
+  EXPECT_TRUE(SetOption(PublishedScriptOptions(), "curve-depth", "v1.6", options).ok());
+  EXPECT_EQ(options.model.options.depth_rule, DepthRule::kLargestPlusOne);
+  EXPECT_TRUE(SetOption(PublishedScriptOptions(), "shuffles", "918", options).ok());
+  EXPECT_EQ(options.model.options.shuffles, ShufflesFromSeed(918));
+  EXPECT_FALSE(SetOption(PublishedScriptOptions(), "shuffles", "12,3", options).ok());
+}
+
 // What would change nothing is refused, with the words for where it would.
 TEST_F(SmallModel, EveryOptionBelongsToAnArchitecture) {
   const std::vector<MethodOption> options = AllMethods().back().options;
@@ -351,7 +368,7 @@ TEST_F(SmallModel, OneForOneComesFromANetworkOfItsOwn) {
   if (!HasShippedNetwork()) GTEST_SKIP() << "this program was built without weights";
   const EnhanceMethod& method = AllMethods().back();
   struct Case {
-    double showing;
+    double visible_share;
     std::optional<int64_t> copies;
     int64_t made;  // of each
     bool standard;
@@ -359,15 +376,15 @@ TEST_F(SmallModel, OneForOneComesFromANetworkOfItsOwn) {
   for (const Case& c : {Case{0.2, {}, 4, false}, Case{0.2, 1, 1, false}, Case{0.2, 4, 4, false}, Case{0.9, {}, 4, true},
                         Case{0.9, 1, 1, false}, Case{0.9, 2, 4, true}}) {
     EnhanceInput input = SheetInput();
-    input.visible_share = c.showing;
+    input.visible_share = c.visible_share;
     EnhanceOptions options;
     options.model.copies = c.copies;
     StepReport report;
     const auto enhanced = method.run(input, options, report);
     ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
     const std::map<std::string, FactValue> facts(report.facts.begin(), report.facts.end());
-    EXPECT_EQ(std::get<int64_t>(facts.at("copies")), c.made) << c.showing;
-    EXPECT_EQ(std::get<bool>(facts.at("network_for_standard_fits")), c.standard) << c.showing;
+    EXPECT_EQ(std::get<int64_t>(facts.at("copies")), c.made) << c.visible_share;
+    EXPECT_EQ(std::get<bool>(facts.at("network_for_standard_fits")), c.standard) << c.visible_share;
     if (c.copies) {
       EXPECT_EQ(enhanced->size(), *c.copies * input.cloud.size());
     }
@@ -377,9 +394,9 @@ TEST_F(SmallModel, OneForOneComesFromANetworkOfItsOwn) {
 // What a merge may cost by default: more for standard fits, little for what refinement begins with.
 TEST_F(SmallModel, WhatAMergeMayCostDependsOnTheNetwork) {
   if (!HasShippedNetwork()) GTEST_SKIP() << "this program was built without weights";
-  const auto made = [](double showing, bool is_refined, std::optional<double> cost) {
+  const auto made = [](double visible_share, bool is_refined, std::optional<double> cost) {
     EnhanceInput input = SheetInput();
-    input.visible_share = showing;
+    input.visible_share = visible_share;
     input.is_refined = is_refined;
     EnhanceOptions options;
     options.model.merge_cost = cost;

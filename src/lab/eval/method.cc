@@ -15,12 +15,14 @@
 #include "core/text.h"
 #include "enhance/enhance.h"
 #include "enhance/filter.h"
+#include "enhance/gaussian_budget.h"
 #include "eval/bicubic_fit.h"
 #include "eval/filter_sweep.h"
 #include "metrics/bicubic.h"
 #include "metrics/image_metrics.h"
 #include "model/any_network.h"
 #include "model/model_method.h"
+#include "model/network_options.h"
 #include "published/enhance_with_published.h"
 #include "reading/reading_model.h"
 #include "render/constant_cloud.h"
@@ -139,46 +141,39 @@ bool IsUpscaler(const fs::path& file) {
   return format != opened->metadata().end() && format->second == kUpscalerFormat;
 }
 
-// Text of the settings that choose among a network's copies.
-std::string ChoiceText(const ModelSettings& model) {
-  std::string text = Cat(" cost ", kMergeCost, " or ", kMergeCostOfStandard);
-  if (model.merge_cost) text = Cat(" cost ", *model.merge_cost);
-  if (model.copies) text = Cat(" copies ", *model.copies);
-  if (model.options.max_gaussians > 0) text += Cat(" most ", model.options.max_gaussians);
-  return text;
-}
+// The costs by which networks choose among copies, unless a cost is given.
+std::string CostText() { return Cat(" cost ", kMergeCost, " or ", kMergeCostOfStandard); }
 
 Result<EvalMethod> Model(const fs::path& file) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string identity, Identity(file));
   const auto network = std::make_shared<std::optional<AnyNetwork>>();  // loaded with the first object
-  return EvalMethod{file.stem().string(), Cat(identity, ChoiceText({})),
-                    [file, network](const MethodTask& task) -> Result<MethodViews> {
-                      if (!*network) {
-                        ANCHORSPLAT_ASSIGN_OR_RETURN(*network, LoadAnyNetwork(file));
-                      }
-                      const auto begin = Clock::now();
-                      GaussianCloud cloud;
-                      StepReport report;
-                      if (const auto* packed = std::get_if<PublishedNetwork>(&**network)) {
-                        ANCHORSPLAT_ASSIGN_OR_RETURN(PublishedResult result,
-                                                     EnhanceWithPublishedNetwork(task.object.low, *packed));
-                        cloud = std::move(result.cloud);
-                      } else {
-                        ANCHORSPLAT_ASSIGN_OR_RETURN(CameraPixelSizes sizes, TruePixelSizes(task.object));
-                        EnhanceInput input;
-                        input.cloud = task.object.low;
-                        input.pixel_sizes = std::move(sizes.sizes);
-                        input.filter_strength = DefaultStrength(task.object);
-                        ANCHORSPLAT_ASSIGN_OR_RETURN(
-                            cloud, EnhanceWithCompactNetwork(std::move(input), task.object.upscale(),
-                                                             std::get<CompactNetwork>(**network), {}, report));
-                      }
-                      const double seconds = SecondsSince(begin);
-                      MethodViews views = SplatViews(task.object, std::move(cloud));
-                      views.seconds = seconds;
-                      views.facts = std::move(report.facts);
-                      return views;
-                    }};
+  return EvalMethod{
+      file.stem().string(), Cat(identity, CostText()), [file, network](const MethodTask& task) -> Result<MethodViews> {
+        if (!*network) {
+          ANCHORSPLAT_ASSIGN_OR_RETURN(*network, LoadAnyNetwork(file));
+        }
+        const auto begin = Clock::now();
+        GaussianCloud cloud;
+        StepReport report;
+        if (const auto* packed = std::get_if<PublishedNetwork>(&**network)) {
+          ANCHORSPLAT_ASSIGN_OR_RETURN(PublishedResult result, EnhanceWithPublishedNetwork(task.object.low, *packed));
+          cloud = std::move(result.cloud);
+        } else {
+          ANCHORSPLAT_ASSIGN_OR_RETURN(CameraPixelSizes sizes, TruePixelSizes(task.object));
+          EnhanceInput input;
+          input.cloud = task.object.low;
+          input.pixel_sizes = std::move(sizes.sizes);
+          input.filter_strength = DefaultStrength(task.object);
+          ANCHORSPLAT_ASSIGN_OR_RETURN(cloud,
+                                       EnhanceWithCompactNetwork(std::move(input), task.object.upscale(),
+                                                                 std::get<CompactNetwork>(**network), {}, report));
+        }
+        const double seconds = SecondsSince(begin);
+        MethodViews views = SplatViews(task.object, std::move(cloud));
+        views.seconds = seconds;
+        views.facts = std::move(report.facts);
+        return views;
+      }};
 }
 
 // Low-resolution cameras without held-out views.
@@ -197,33 +192,24 @@ CameraSet TrainingCameras(const BenchmarkObject& object) {
 struct NamedMethod {
   std::string word;  // as given by the user
   std::string name;
-  const std::vector<EnhanceMethod>* methods = nullptr;  // the list it belongs to
-  bool by_default = false;                              // chosen by the program, with `name` as the outcome
-  std::string quality;                                  // requested quality; empty: none
+  bool by_default = false;  // chosen by the program, with `name` as the outcome
   bool auto_pixel_size =
       false;  // NAME-auto: it gets no cameras, p_LR is read off the splat, as for a user who has the splat alone
-  RefineOptions refine;
-  ModelSettings model;
-  std::optional<double> filter_strength;
-  std::string upscaler;  // Identity of refine.enlarge_with
+  EnhanceOptions options;  // with the list that the method belongs to, the quality, and what `word` sets
+  std::string files;       // Identity of those that `word` names
 
-  bool TakesPictures() const { return quality == "best" || name.ends_with("refine-images"); }
+  bool TakesPictures() const { return options.quality == "best" || name.ends_with("refine-images"); }
 
-  // Everything it depends on besides the object; the refinement part is empty for other methods.
+  // See EvalMethod; the refinement part is empty for other methods.
   std::string Settings() const {
-    RefineOptions with_pictures = refine;
+    RefineOptions with_pictures = options.refine;
     if (TakesPictures()) with_pictures.images = "the object's";
     const bool refines = name.find("refine") != std::string::npos || name.ends_with("detail");
     std::string settings = by_default ? Cat(name, " ") : "";
     settings += refines ? Cat(ToJsonText(with_pictures), " revision ", kRefineRevision) : "";
-    if (!upscaler.empty()) settings += Cat(" enlarged with ", upscaler);
-    if (refine.seconds) settings += Cat(" ", *refine.seconds, " s");
-    if (filter_strength) settings += Cat(" f ", *filter_strength);
-    settings += Cat(" reading ", ReadingModel::ShippedIdentity(), " ");  // the reading may leave a splat alone
+    settings += Cat(files, " reading ", ReadingModel::ShippedIdentity(), " ");  // the reading may leave a splat alone
     // Refinement with pictures also starts from a network's result.
-    if (name.starts_with("model") || name == "refine-images") {
-      settings += ShippedNetworkIdentity() + ChoiceText(model);
-    }
+    if (name.starts_with("model") || name == "refine-images") settings += ShippedNetworkIdentity() + CostText();
     return settings;
   }
 };
@@ -238,63 +224,48 @@ Result<double> ParseStrength(const std::string& word, std::string_view value) {
                Cat("--methods ", Printable(word), ": f must be a number from 0 to ", kMaxFilterStrength)};
 }
 
-// Parses a setting of the choice among copies: a cost, or an integer of at least 1.
-Result<double> ParseCount(const std::string& word, std::string_view key, std::string_view value) {
-  double number = 0;
-  const char* end = value.data() + value.size();
-  const auto [stop, code] = std::from_chars(value.data(), end, number);
-  const bool whole = number >= 1 && number <= 1e12 && number == std::floor(number);
-  if (code == std::errc() && stop == end && (key == "merge-cost" ? number >= 0 && std::isfinite(number) : whole)) {
-    return number;
+// The options that a word can set.
+std::vector<MethodOption> KnownOptions() {
+  std::vector<MethodOption> known = RefinementOptions();
+  for (const auto& more : {NetworkOptions(), PublishedScriptOptions()}) {
+    known.insert(known.end(), more.begin(), more.end());
   }
-  return Error{ErrorCode::kBadArgument, Cat("--methods ", Printable(word), ": ", key, " must be a ",
-                                            key == "merge-cost" ? "number of 0 or more" : "whole number of 1 or more")};
+  std::erase_if(known, [](const MethodOption& option) {
+    return option.name == "images" || option.name == "hold-out" || option.name == "downscale";
+  });
+  return known;
 }
 
-Status SetOption(NamedMethod& method, std::string_view key, std::string_view value) {
-  if (key == "hold-out") {
-    return Error{ErrorCode::kBadArgument, Cat("--methods ", Printable(method.word),
-                                              ": hold-out cannot be set, as the benchmark chooses the held-out views")};
+Status SetOptionOf(NamedMethod& method, const std::string& key, const std::string& value) {
+  const auto bad = [&](const std::string& why) {
+    return Error{ErrorCode::kBadArgument, Cat("--methods ", Printable(method.word), ": ", why)};
+  };
+  if (key == "images" || key == "hold-out" || key == "downscale") {
+    return bad(key + " cannot be set, as the benchmark chooses the pictures, their size and the held-out views");
   }
-  if (key == "downscale") {
-    return Error{ErrorCode::kBadArgument, Cat("--methods ", Printable(method.word),
-                                              ": downscale cannot be set, as the benchmark sets the picture size")};
-  }
-  if (key == "copies" && value == "auto") return {};
-  if (key == "copies" || key == "max-gaussians" || key == "merge-cost") {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const double number, ParseCount(method.word, key, value));
-    if (key == "copies") method.model.copies = static_cast<int64_t>(number);
-    if (key == "max-gaussians") {
-      method.model.options.max_gaussians = method.refine.max_gaussians = static_cast<int64_t>(number);
-    }
-    if (key == "merge-cost") method.model.merge_cost = number;
+  if (key == "f") {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(method.options.filter_strength, ParseStrength(method.word, value));
+    method.options.given.emplace_back("filter-strength");
     return {};
   }
-  if (key == "enlarge-with") {
-    method.refine.enlarge_with = value;
-    ANCHORSPLAT_ASSIGN_OR_RETURN(method.upscaler, Identity(method.refine.enlarge_with));
-    return {};
+  const std::vector<MethodOption> known = KnownOptions();
+  const Status set = SetOption(known, key, value, method.options);
+  if (!set.ok()) return bad(set.error().message);
+  SetBudget(method.options, method.options.max_gaussians);
+  const auto option = std::ranges::find(known, method.options.given.back(), &MethodOption::name);
+  if (std::holds_alternative<fs::path*>(option->value(method.options))) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string identity, Identity(value));
+    method.files += Cat(" ", key, " ", identity);
   }
-  if (key != "f") {
-    const Status set = SetRefineOption(method.refine, key, value);
-    if (set.ok()) return set;
-    return Error{ErrorCode::kBadArgument, Cat("--methods ", Printable(method.word), ": ", set.error().message,
-                                              "; f is for the filter, copies and merge-cost are for networks")};
-  }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(method.filter_strength, ParseStrength(method.word, value));
   return {};
 }
 
 // Rejects options without effect.
-Status CheckGiven(const NamedMethod& method, const std::set<std::string>& keys) {
-  EnhanceOptions options;
-  options.methods = method.methods;
+Status CheckGiven(const NamedMethod& method) {
+  EnhanceOptions options = method.options;
   options.method = method.name;
-  options.refine = method.refine;
-  options.model = method.model;
   if (method.name.ends_with("refine-images")) options.refine.images = "the object's";
   if (!method.auto_pixel_size) options.cameras.emplace();
-  for (const std::string& key : keys) options.given.push_back(key == "f" ? "filter-strength" : key);
   return CheckOptions(options);
 }
 
@@ -303,7 +274,7 @@ constexpr std::string_view kAuto = "-auto";
 // Parses NAME or NAME-auto, optionally with @KEY=VALUE@KEY=VALUE…; unset if there is no such method.
 Result<std::optional<NamedMethod>> ParseNamed(const std::string& word, const std::vector<EnhanceMethod>& methods) {
   NamedMethod method;
-  method.methods = &methods;
+  method.options.methods = &methods;
   method.word = word;
   const size_t name_end = std::min(word.find('@'), word.size());
   method.name = word.substr(0, name_end);
@@ -328,23 +299,21 @@ Result<std::optional<NamedMethod>> ParseNamed(const std::string& word, const std
     return Error{ErrorCode::kBadArgument,
                  Cat("--methods ", Printable(word), ": only networks, refine and refine-images have options")};
   }
-  std::set<std::string> keys;
   for (size_t at = name_end; at < word.size();) {
     const size_t end = std::min(word.find('@', at + 1), word.size());
     const std::string option = word.substr(at + 1, end - at - 1);
     const size_t equals = option.find('=');
-    std::string key = option.substr(0, equals);
-    if (key == "most-gaussians") key = "max-gaussians";  // former name
-    if (equals == std::string::npos || !keys.insert(key).second) {
-      return Error{ErrorCode::kBadArgument,
-                   Cat("--methods ", Printable(word), ": options must be @KEY=VALUE, each once; known: f, ",
-                       RefineOptionKeys())};
+    if (equals != std::string::npos) {
+      ANCHORSPLAT_RETURN_IF_ERROR(SetOptionOf(method, option.substr(0, equals), option.substr(equals + 1)));
     }
-    ANCHORSPLAT_RETURN_IF_ERROR(SetOption(method, key, option.substr(equals + 1)));
+    const std::vector<std::string>& given = method.options.given;
+    if (equals == std::string::npos || std::ranges::count(given, given.back()) > 1) {
+      return Error{ErrorCode::kBadArgument,
+                   Cat("--methods ", Printable(word), ": options must be @KEY=VALUE, each once")};
+    }
     at = end;
   }
-  Status valid = Validate(method.refine);
-  if (valid.ok()) valid = CheckGiven(method, keys);
+  const Status valid = CheckGiven(method);
   if (!valid.ok()) {
     return Error{ErrorCode::kBadArgument, Cat("--methods ", Printable(word), ": ", valid.error().message)};
   }
@@ -356,26 +325,20 @@ double ProcessorSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PE
 
 bool ChosenByItself(const NamedMethod& method) {
   EnhanceOptions options;
-  options.methods = method.methods;
+  options.methods = method.options.methods;
   const auto plan = PlanEnhancement(options);
   return plan.ok() && plan->Name() == method.name;
 }
 
 EvalMethod Named(const NamedMethod& method) {
   return {method.word, method.Settings(), [method](const MethodTask& task) -> Result<MethodViews> {
-            EnhanceOptions options;
-            options.methods = method.methods;
+            EnhanceOptions options = method.options;
             options.method = method.name;
             // Like a user with nothing but the splat: if the program would choose this method itself, it may also skip
             // it.
             if (method.by_default || (method.auto_pixel_size && ChosenByItself(method))) options.method = "auto";
-            options.quality = method.quality;
             options.upscale = task.object.upscale();
             if (!method.auto_pixel_size) options.cameras = TrainingCameras(task.object);
-            options.refine = method.refine;
-            options.model = method.model;
-            options.max_gaussians = method.refine.max_gaussians;
-            options.filter_strength = method.filter_strength;
             if (method.TakesPictures()) {
               options.refine.images = task.object.low_project;
               options.refine.hold_out = task.object.hold_out;
@@ -409,12 +372,10 @@ Result<std::optional<NamedMethod>> ParseDefault(const std::string& word, const s
   if (word != "auto" && word != "fast" && word != "good" && word != "best") return std::optional<NamedMethod>();
   NamedMethod method;
   method.word = word;
-  method.methods = &methods;
   method.by_default = true;
-  if (word != "auto") method.quality = word;
-  EnhanceOptions options;
-  options.methods = &methods;
-  options.quality = method.quality;
+  method.options.methods = &methods;
+  if (word != "auto") method.options.quality = word;
+  EnhanceOptions options = method.options;
   if (method.TakesPictures()) options.refine.images = "the object's";
   ANCHORSPLAT_ASSIGN_OR_RETURN(const MethodPlan plan, PlanEnhancement(options));
   method.name = plan.Name();

@@ -37,7 +37,7 @@ struct MethodViews {
 // A row of an evaluation.
 struct EvalMethod {
   std::string name;      // in tables and file names
-  std::string settings;  // everything results depend on besides the object; equal text means equal results
+  std::string settings;  // what results depend on besides name and object; equal ones mean equal results
   std::function<Result<MethodViews>(const MethodTask&)> prepare;
 };
 
@@ -64,7 +64,7 @@ struct MethodOptions {
 //   NAME          another method of `enhance_methods`, given the training cameras: "model", for example,
 //                 is the built-in network. NAME+NAME: the second starts from the first's result.
 //                 NAME-auto gets no cameras and reads the pixel size off the splat (fact "pixel_size_ratio").
-//                 Refinement takes options: refine@k=1@steps=400@f=0.6, keys of SetRefineOption and f of the filter
+//                 With options of refinement and networks, and f of the filter: refine@k=1@steps=400@f=0.6
 // Errors: kBadArgument: another word; kNotFound: a missing file.
 Result<EvalMethod> MakeEvalMethod(const std::string& word, const MethodOptions& options);
 

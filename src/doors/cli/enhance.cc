@@ -208,9 +208,12 @@ Error WithWayOn(Error error, const fs::path& checkpoint) {
   return error;
 }
 
-// Enhances one file; returns its row of the results. `said`: the expected output was reported.
+// What is known about how large the output becomes.
+enum class Forecast { kUnknown, kAccepted, kSaid };
+
+// Enhances one file; returns its row of the results.
 Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& shared, EnhanceOptions options,
-                                  const std::string& input, const fs::path& output, bool said) {
+                                  const std::string& input, const fs::path& output, Forecast forecast) {
   const DeviceUse device;
   const MemoryLimit limit(flags.size.arrays(), output.parent_path());
   std::optional<StopSignal> stop_signal(std::in_place, StopSignal::Leaves::kNothing);
@@ -218,11 +221,13 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
   ExtraProperties extras;
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, file.Read({}, &extras));
   stop_signal.reset();  // so that Ctrl-C ends the question
-  if (!said) {
-    const OutputPlan plan =
-        PlanOf(options, input, output, {cloud.size(), cloud.sh_degree}, CountOutside(options.region, cloud));
-    ANCHORSPLAT_RETURN_IF_ERROR(SayAndAsk({&plan, 1}, flags.size, shared));
+  const OutputPlan plan =
+      PlanOf(options, input, output, {cloud.size(), cloud.sh_degree}, CountOutside(options.region, cloud));
+  bool said = forecast == Forecast::kSaid;
+  if (forecast == Forecast::kUnknown) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(said, AskIfLarge({&plan, 1}, flags.size, shared));
   }
+  if (!said) options.starting = [&plan, &flags] { Say(plan, flags.size); };
   Buffer<float> means = KeepUsable(extras, cloud);
   GaussianCloud before;
   if (flags.view) {
@@ -327,22 +332,23 @@ Status RunInputs(const EnhanceWords& flags, Program& program) {
   }
 
   std::vector<BatchItem> items;
-  std::vector<bool> said;
+  std::vector<Forecast> forecasts;
   std::vector<OutputPlan> plans;
   for (size_t i = 0; i < outputs.size(); ++i) {
     items.push_back({flags.inputs[i], outputs[i].string()});
     // Only the data says how many Gaussians lie in a region.
     const std::optional<CloudExtent> extent = options.region ? std::nullopt : ExtentOf(flags.inputs[i]);
-    said.push_back(extent.has_value());
+    forecasts.push_back(extent ? Forecast::kAccepted : Forecast::kUnknown);
     if (extent) plans.push_back(PlanOf(options, flags.inputs[i], outputs[i], *extent));
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(SayAndAsk(plans, flags.size, shared));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const bool said, AskIfLarge(plans, flags.size, shared));
+  if (said) std::ranges::replace(forecasts, Forecast::kAccepted, Forecast::kSaid);
   return RunBatch(
       items,
       [&](size_t i) {
         std::optional<NamedMessages> named;
         if (items.size() > 1) named.emplace(flags.inputs[i]);
-        return EnhanceOne(flags, shared, options, flags.inputs[i], outputs[i], said[i]);
+        return EnhanceOne(flags, shared, options, flags.inputs[i], outputs[i], forecasts[i]);
       },
       program);
 }

@@ -74,8 +74,12 @@ std::string Spoken(const OutputPlan& plan, const SizeFlags& flags) {
 
 }  // namespace
 
-Status SayAndAsk(std::span<const OutputPlan> plans, const SizeFlags& flags, const SharedFlags& shared) {
-  if (plans.empty()) return {};
+void Say(const OutputPlan& plan, const SizeFlags& flags) {
+  if (plan.bytes >= kWorthAWord || plan.seconds.value_or(0) >= kLongWait) LogInfo(Spoken(plan, flags));
+}
+
+Result<bool> AskIfLarge(std::span<const OutputPlan> plans, const SizeFlags& flags, const SharedFlags& shared) {
+  if (plans.empty()) return false;
   // Outputs add up; temporary files are removed before the next. All are in one folder.
   uint64_t bytes = 0, temporary = 0;
   for (const OutputPlan& plan : plans) {
@@ -98,16 +102,22 @@ Status SayAndAsk(std::span<const OutputPlan> plans, const SizeFlags& flags, cons
                                               ". Nothing was written; pass --yes to write it anyway, or "
                                               "--max-gaussians N to make it smaller")};
   }
-  for (const OutputPlan& plan : plans) {
-    const bool worth_a_word = plan.bytes >= kWorthAWord || plan.seconds.value_or(0) >= kLongWait;
-    if (!why.empty() || worth_a_word) LogInfo(Spoken(plan, flags));
-  }
-  if (why.empty() || flags.yes) return {};
+  if (why.empty()) return false;
+  for (const OutputPlan& plan : plans) LogInfo(Spoken(plan, flags));
+  if (flags.yes) return true;
   std::cerr << why << ". Continue? [y/N] " << std::flush;
   std::string answer;
   std::getline(std::cin, answer);
-  if (IsYes(answer)) return {};
+  if (IsYes(answer)) return true;
   return Error{ErrorCode::kBadArgument, Cat(plans.front().output.string(), ": not written: the answer was not yes")};
+}
+
+Status SayAndAsk(std::span<const OutputPlan> plans, const SizeFlags& flags, const SharedFlags& shared) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const bool said, AskIfLarge(plans, flags, shared));
+  for (const OutputPlan& plan : plans) {
+    if (!said) Say(plan, flags);
+  }
+  return {};
 }
 
 }  // namespace anchorsplat

@@ -47,8 +47,14 @@ struct OutputPlan {
 // Larger outputs need confirmation.
 inline constexpr uint64_t kLargeOutput = 4'000'000'000;
 
-// Reports the expected outputs of a command and their cost, unless small. Asks for confirmation if together they exceed
-// kLargeOutput or the free disk space. kBadArgument: no --yes, and no terminal to ask on or the answer was no.
+// Reports an expected output and its cost, unless small.
+void Say(const OutputPlan& plan, const SizeFlags& flags);
+
+// Reports the outputs of a command and asks for confirmation if together they exceed kLargeOutput or the free disk
+// space; returns whether it did. kBadArgument: no --yes, and no terminal to ask on or the answer was no.
+Result<bool> AskIfLarge(std::span<const OutputPlan> plans, const SizeFlags& flags, const SharedFlags& shared);
+
+// Both.
 Status SayAndAsk(std::span<const OutputPlan> plans, const SizeFlags& flags, const SharedFlags& shared);
 
 // Free bytes on the disk of this file, whose folder may not exist yet. Unset if unknown, or if nothing can be stored

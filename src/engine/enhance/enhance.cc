@@ -269,6 +269,9 @@ Result<Enhanced> EnhanceFromOrigin(GaussianCloud cloud, const EnhanceOptions& op
   }
 
   LeaveIfAbandoned();
+  if (options.starting && (!sized.any || report.filter_strength > 0 || plan.method->invents(options))) {
+    options.starting();
+  }
   const Stopwatch watch;
   EnhanceOptions within = options;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud rest, SplitOffOutside(options, input, within, report));

@@ -98,8 +98,11 @@ TEST_F(EnhanceTest, LeavesWhatItMadeAlone) {
   EnhanceOptions options;
   options.mode = RenderMode::kClassic;
   options.pixel_size = 0.01;
+  int starts = 0;
+  options.starting = [&starts] { ++starts; };
   auto once = Enhance(Ball(0.01), options);
   ASSERT_TRUE(once.ok());
+  EXPECT_EQ(starts, 1);
   EXPECT_TRUE(IsMarkedEnhanced(once->cloud));
   EXPECT_FALSE(log_->Says("already enhanced"));
   const auto twice = Enhance(once->cloud, options);
@@ -107,6 +110,7 @@ TEST_F(EnhanceTest, LeavesWhatItMadeAlone) {
   EXPECT_EQ(twice->cloud.log_scales, once->cloud.log_scales);
   EXPECT_EQ(twice->cloud.comments, once->cloud.comments);
   EXPECT_EQ(twice->report.filter_strength, 0);
+  EXPECT_EQ(starts, 1) << "no work on a splat that is left alone";
   EXPECT_TRUE(log_->Says("already enhanced")) << log_->text();
   options.filter_strength = 0.7;
   const auto forced = Enhance(once->cloud, options);

@@ -83,6 +83,7 @@ FUNCTIONS = {
             "overwrite": "nothing is written",
             "seed": "nothing is random",
             "side-by-side": "anchorsplat.sheet",
+            "summary": "the report has both",
             "lpips": "needs LibTorch",
             "lpips-weights": "needs LibTorch",
         },

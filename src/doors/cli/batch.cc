@@ -1,5 +1,6 @@
 #include "cli/batch.h"
 
+#include <iostream>
 #include <nlohmann/json.hpp>
 
 #include "core/log.h"
@@ -14,6 +15,7 @@ Status RunBatch(const std::vector<BatchItem>& items, const std::function<Result<
   for (size_t k = 0; k < items.size(); ++k) {
     const BatchItem& item = items[k];
     const Result<nlohmann::json> row = run(k);
+    std::cout.flush();  // before messages about later files
     if (row.ok()) {
       rows.push_back(*row);
       continue;

@@ -39,6 +39,7 @@ struct CompareWords {
   std::string side_by_side;
   std::string lpips;
   std::string lpips_weights;
+  bool summary = false;
   CompareFlags how;
 };
 
@@ -80,7 +81,7 @@ void PrintTable(const CompareWords& flags, const std::vector<Comparison>& result
     if (results.size() == 2 && corrected) row.push_back(Signed(cc_psnr[1] - cc_psnr[0]));
     rows.push_back(row);
   };
-  for (size_t v = 0; v < results[0].views.size(); ++v) {
+  for (size_t v = 0; v < results[0].views.size() && !flags.summary; ++v) {
     add(results[0].views[v].name, [v](const Comparison& c) { return c.views[v]; });
   }
   add("mean", MeanOf);
@@ -191,11 +192,12 @@ void AddCompare(CLI::App& app, Program& program) {
                   "PNG of the view with the median score: pictures, zoomed crop, difference")
       ->type_name("FILE")
       ->check(NotEmpty());
+  verb.add_flag("--summary", flags->summary, "Print only the means, not every view; --json always has both");
   AddLpipsFlags(verb, flags->lpips, flags->lpips_weights);
   flags->how.AddTo(verb);
   program.device.AddTo(verb);
-  ShortenHelp(verb, {"--truth", "--cameras", "--orbit", "--view", "--size", "--background", "--side-by-side", "--lpips",
-                     "--color-correct", "--device", "--overwrite", "--quiet", "--json"});
+  ShortenHelp(verb, {"--truth", "--cameras", "--orbit", "--view", "--size", "--background", "--side-by-side",
+                     "--summary", "--lpips", "--color-correct", "--device", "--overwrite", "--quiet", "--json"});
   verb.callback([flags, &verb, &program] {
     flags->how.given = GivenOptions(verb);
     program.run = [flags, &program] { return RunCompare(*flags, program.flags); };

@@ -10,6 +10,7 @@ namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 class CompareVerb : public testing::Test {
  protected:
@@ -34,6 +35,9 @@ TEST_F(CompareVerb, TwoSplats) {
   const ProgramRun same = ExpectDone({"compare", scan_, scan_, "--orbit", "2", "--size", "48x48"});
   EXPECT_THAT(same.out, AllOf(HasSubstr("PSNR"), HasSubstr("inf  1.0000")));
   EXPECT_THAT(same.err, HasSubstr("how alike A and B are"));
+  EXPECT_THAT(same.out, HasSubstr("001"));
+  EXPECT_THAT(ExpectDone({"compare", views_, views_, "--summary"}).out,
+              AllOf(HasSubstr("mean"), Not(HasSubstr("001"))));
   EXPECT_THAT(ExpectDone({"compare", views_, views_}).err, IsEmpty()) << "B may be ground truth";
   EXPECT_EQ(ExpectJson({"compare", scan_, scan_, "--orbit", "1", "--size", "48x48"})["mean"]["psnr"], nullptr);
 }

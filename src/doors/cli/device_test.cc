@@ -64,7 +64,8 @@ TEST_F(Device, IsInEveryReport) {
   EXPECT_EQ(ExpectJson(Render({}))["device"], kCpu);
   EXPECT_EQ(ExpectJson({"compare", scan_, scan_, "--orbit", "1", "--size", "32x32"})["device"], kCpu);
   EXPECT_EQ(ExpectJson({"compare", scan_, scan_, "--truth", scan_, "--orbit", "1", "--size", "32x32"})["device"], kCpu);
-  EXPECT_EQ(ExpectJson({"view", scan_, "-o", folder_ / "page.html"})["device"], kCpu);
+  EXPECT_EQ(ExpectJson({"view", scan_, "-o", folder_ / "page.html", "--device", "1000"})["device"], kCpu)
+      << "a page needs no GPU";
   EXPECT_EQ(ExpectJson({"enhance", scan_, "-o", folder_ / "out.ply", "--method", "filter"})[0]["device"], kCpu);
   EXPECT_EQ(ExpectJson({"fit", WriteProject(folder_ / "project"), "-o", folder_ / "fit.ply", "--steps", "2",
                         "--init-points", "50"})["device"],

@@ -77,8 +77,9 @@ Status CheckOutputs(const FitWords& flags, const FitControl& control, bool overw
 void PrintReport(const FitWords& flags, const FitReport& r) {
   std::ostream& out = ResultsBeside(flags.memory());
   out << OutputName(flags.output, flags.memory()) << ": " << WithThousands(r.gaussians_out) << " Gaussians after "
-      << WithThousands(r.steps) << " steps in " << HumanSeconds(r.seconds) << "\n  training views: " << r.train.views
-      << ", " << Fixed(r.train.psnr, 2) << " dB, SSIM " << Fixed(r.train.ssim, 4) << "\n";
+      << WithThousands(r.steps) << (r.steps == 1 ? " step in " : " steps in ") << HumanSeconds(r.seconds)
+      << "\n  training views: " << r.train.views << ", " << Fixed(r.train.psnr, 2) << " dB, SSIM "
+      << Fixed(r.train.ssim, 4) << "\n";
   if (r.held_out.views > 0) {
     out << "  held-out views: " << r.held_out.views << ", " << Fixed(r.held_out.psnr, 2) << " dB, SSIM "
         << Fixed(r.held_out.ssim, 4) << "\n";

@@ -52,6 +52,10 @@ TEST_F(FitVerb, SaysWhatItDid) {
   EXPECT_THAT(run.err, HasSubstr("10 training views, 0 held out"));
   EXPECT_THAT(run.out, AllOf(HasSubstr("Gaussians after 12 steps"), HasSubstr("training views: 10, ")));
   EXPECT_THAT(ExpectDone(Fit("quiet.ply", {"-q"})).err, IsEmpty());
+  EXPECT_THAT(ExpectDone({"fit", project_, "-o", folder_ / "one.ply", "--init-points", "200", "--steps", "1"}).out,
+              HasSubstr("Gaussians after 1 step in"));
+  ExpectRefused({"fit", folder_ / "fit.ply", "-o", folder_ / "bad.ply"}, ErrorCode::kBadFile,
+                {"fit.ply", "a splat or a point cloud, not cameras"});
 }
 
 TEST_F(FitVerb, SaysWhereNothingIsLeft) {

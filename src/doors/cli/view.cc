@@ -190,7 +190,10 @@ void AddView(CLI::App& app, Program& program) {
   program.device.AddTo(verb);
   ShortenHelp(verb, {"--output", "--before", "--cameras", "--truth", "--title", "--background", "--sh-degree",
                      "--folder", "--filter-box", "--filter-floaters", "--overwrite", "--quiet", "--json"});
-  verb.callback([flags, &program] { program.run = [flags, &program] { return RunView(*flags, program.flags); }; });
+  verb.callback([flags, &program] {
+    program.device.device = {};  // a page is data: nothing is rasterized here
+    program.run = [flags, &program] { return RunView(*flags, program.flags); };
+  });
 }
 
 }  // namespace anchorsplat

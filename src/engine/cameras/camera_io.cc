@@ -84,14 +84,24 @@ Result<CameraSet> CamerasFromBytes(const std::filesystem::path& file, std::strin
   return CamerasFromJson(parsed.root(), folder, complete, frame);
 }
 
+// First bytes of a file; empty if unreadable.
+std::string HeadOf(const std::filesystem::path& path) {
+  std::string head(kHeadBytes, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(head.data(), std::ssize(head));
+  head.resize(static_cast<size_t>(std::max<std::streamsize>(0, file.gcount())));
+  return head;
+}
+
 Result<CameraSet> ReadCameraFile(const std::filesystem::path& path, const std::filesystem::path& frame) {
   if (path.extension() == ".npy") {
     if (!frame.empty()) return Error{ErrorCode::kBadFile, Cat(path.string(), ": ", NotOfNerfstudio(frame))};
     return ReadPosesBounds(path);
   }
   // Project files may be far larger than camera files.
-  if (const std::string foreign = ForeignCameras(path); !foreign.empty() && IsFile(path)) {
-    return Error{ErrorCode::kBadFile, Cat(path.string(), ": ", foreign)};
+  if (IsFile(path)) {  // the bytes of a pipe can be read once only
+    const std::string foreign = ForeignCameras(path, HeadOf(path));
+    if (!foreign.empty()) return Error{ErrorCode::kBadFile, Cat(path.string(), ": ", foreign)};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string bytes, ReadFileBytes(path, kMostCameraBytes));
   const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
@@ -102,15 +112,6 @@ Result<CameraSet> ReadModel(const std::filesystem::path& model, const std::files
   ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadColmapModel(model));
   if (!frame.empty()) ANCHORSPLAT_RETURN_IF_ERROR(MoveToNerfstudioFrame(frame, {}, set));
   return set;
-}
-
-// First bytes of a file in a folder; empty if unreadable.
-std::string HeadOf(const std::filesystem::path& path) {
-  std::string head(kHeadBytes, '\0');
-  std::ifstream file(path, std::ios::binary);
-  file.read(head.data(), std::ssize(head));
-  head.resize(static_cast<size_t>(std::max<std::streamsize>(0, file.gcount())));
-  return head;
 }
 
 bool IsCameraFile(const std::filesystem::path& path) {

@@ -22,6 +22,8 @@ constexpr const char* kFromRealityCapture =
     "export the registration as COLMAP, or as Bundler (bundle.out and its picture list)";
 constexpr const char* kByNerfstudio = "convert it to a transforms.json with nerfstudio's ns-process-data";
 
+constexpr const char* kCamerasOf = "pass the transforms.json, the COLMAP model or the project folder";
+
 const std::vector<ForeignProgram>& ForeignPrograms() {
   static const std::vector<ForeignProgram> programs = {
       {{".psx", ".psz", ".psb"},
@@ -42,6 +44,11 @@ const std::vector<ForeignProgram>& ForeignPrograms() {
        "a Pix4D file",
        "export OPF and convert it to a COLMAP model with pyopf's opf2colmap"},
       {{".r3d"}, {}, "a Record3D capture", kByNerfstudio},
+      {{".splat", ".ksplat", ".spz", ".sog"},
+       {"ply\n", "ply\r", "glTF"},
+       "a splat or a point cloud, not cameras",
+       kCamerasOf},
+      {{}, {"\x89PNG", "\xff\xd8\xff", "RIFF"}, "a picture, not cameras", kCamerasOf},
       {{".abc", ".fbx", ".usd", ".usda", ".usdc", ".usdz", ".blend"},
        {},
        "a scene file of a 3D program",

@@ -36,6 +36,10 @@ TEST(ForeignCameras, AreNamedWithWhatToExportInstead) {
       {"transforms_eval.json", R"([{"file_path": "a.png", "transform": [[1]]}])", "ns-export", "transforms.json"},
       {"camera_models.json", R"({"v2 dji 1 2 brown": {"projection_type": "brown"}})", "without poses",
        "reconstruction.json"},
+      {"scan.ply", "ply\nformat binary_little_endian 1.0\n", "a splat or a point cloud, not cameras",
+       "transforms.json"},
+      {"scan.spz", "\x1f\x8b", "a splat or a point cloud, not cameras", "project folder"},
+      {"picture.json", "\x89PNG\r\n", "a picture, not cameras", "COLMAP model"},
       {"database.db", "SQLite format 3", "database", "the model"},
   };
   for (const Case& c : cases) {

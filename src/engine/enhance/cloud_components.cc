@@ -134,15 +134,15 @@ double ExtentOf(const Graph& graph, const std::vector<size_t>& members) {
 }  // namespace
 
 CloudComponents FindComponents(const GaussianCloud& cloud) {
-  std::vector<int64_t> showing;
+  std::vector<int64_t> visible;
   for (int64_t i = 0; i < cloud.size(); ++i) {
-    if (HasUsableShape(cloud, i) && ShowsInPictures(cloud, static_cast<size_t>(i))) showing.push_back(i);
+    if (HasUsableShape(cloud, i) && ShowsInPictures(cloud, static_cast<size_t>(i))) visible.push_back(i);
   }
-  const int64_t count = std::ssize(showing), sampled = std::min(count, kComponentSample);
+  const int64_t count = std::ssize(visible), sampled = std::min(count, kComponentSample);
   if (static_cast<double>(count) < 2 * kLeastOfPiece) return {};
   Buffer<float> places(static_cast<size_t>(3 * sampled));
   for (int64_t k = 0; k < sampled; ++k) {
-    std::copy_n(cloud.means.data() + 3 * showing[static_cast<size_t>(k * count / sampled)], 3, places.data() + 3 * k);
+    std::copy_n(cloud.means.data() + 3 * visible[static_cast<size_t>(k * count / sampled)], 3, places.data() + 3 * k);
   }
   const Graph graph = JoinNeighbours(std::move(places));
   LeaveIfAbandoned();

@@ -26,7 +26,7 @@ int64_t DropLeastVisible(int64_t most, GaussianCloud& cloud) {
   std::vector<char> keep(static_cast<size_t>(cloud.size()), 0);
   for (const int64_t row : MostVisible(cloud, most)) keep[static_cast<size_t>(row)] = 1;
   LogWarning(Cat("--max-gaussians ", WithThousands(most), ": dropped the ", WithThousands(over),
-                 " Gaussians with the least opacity × size"));
+                 over == 1 ? " Gaussian" : " Gaussians", " with the least opacity × size"));
   KeepMarked(keep, cloud);
   return over;
 }

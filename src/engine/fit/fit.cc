@@ -63,7 +63,7 @@ class KeptState {
   }
 
   Error NotedIn(Error error) const {
-    if (step_) error.message += Cat("; the state after ", WithThousands(*step_), " steps is saved in ", path_.string());
+    if (step_) error.message += Cat("; the state after step ", WithThousands(*step_), " is saved in ", path_.string());
     return error;
   }
 

@@ -10,6 +10,7 @@
 #include "core/log.h"
 #include "core/splat_comments.h"
 #include "core/text.h"
+#include "io/size_limit.h"
 
 namespace anchorsplat {
 
@@ -56,8 +57,7 @@ Result<std::vector<std::string>> CommentsOfAsset(const JsonValue& root) {
   if (const std::optional<JsonValue> copyright = asset->Find("copyright"); copyright && copyright->raw().is_string()) {
     const auto& text = copyright->raw().get_ref<const std::string&>();
     if (text.size() > kMostBytes) {
-      return copyright->Complain(
-          Cat("is ", HumanBytes(text.size()), " of text, more than the limit of ", HumanBytes(kMostBytes)));
+      return copyright->Complain(Cat("is ", MoreThanLimit(text.size(), kMostBytes, " of text")));
     }
     comments = CommentsOfCopyright(text);
   }

@@ -15,6 +15,7 @@
 #include "core/run_context.h"
 #include "core/text.h"
 #include "io/input_record.h"
+#include "io/size_limit.h"
 
 namespace anchorsplat {
 
@@ -187,8 +188,7 @@ Result<std::string> InputFile::Head(size_t size) const {
 
 Result<std::string> InputFile::ReadAll(uint64_t max_size) const {
   if (size_ > max_size) {
-    return Error{ErrorCode::kBadFile, Cat(name(), ": has ", HumanBytes(size_), ", more than the limit of ",
-                                          HumanBytes(max_size), " for such a file")};
+    return Error{ErrorCode::kBadFile, Cat(name(), ": has ", MoreThanLimit(size_, max_size), " for such a file")};
   }
   return Head(static_cast<size_t>(size_));
 }

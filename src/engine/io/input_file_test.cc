@@ -11,6 +11,7 @@
 
 #include "core/run_context.h"
 #include "io/folder_for_test.h"
+#include "io/size_limit.h"
 
 namespace anchorsplat {
 namespace {
@@ -34,6 +35,12 @@ TEST(InputFile, AbandonsAPipeWithoutAWriter) {
   const std::atomic<bool> abandon{true};
   const RunScope scope({.abandon = &abandon});
   EXPECT_THROW({ const auto file = InputFile::Open(pipe); }, RunAbandoned);
+}
+
+TEST(InputFile, SizesThatDifferReadDifferently) {
+  EXPECT_EQ(MoreThanLimit(300'000'000, 268'435'456), "300 MB, more than the limit of 268 MB");
+  EXPECT_EQ(MoreThanLimit(268'435'457, 268'435'456), "268,435,457 bytes, more than the limit of 268,435,456 bytes");
+  EXPECT_EQ(MoreThanLimit(1001, 1000, " of text"), "1,001 bytes of text, more than the limit of 1,000 bytes");
 }
 
 }  // namespace

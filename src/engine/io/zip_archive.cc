@@ -8,6 +8,7 @@
 
 #include "core/text.h"
 #include "io/compression_ratio.h"
+#include "io/size_limit.h"
 
 namespace anchorsplat {
 
@@ -107,8 +108,7 @@ Result<std::string> ZipReader::Read(const std::string& member, uint64_t max_size
   const auto entry = std::ranges::find(entries_, member, &ZipEntry::name);
   if (entry == entries_.end()) return Error{ErrorCode::kBadFile, Cat(where, ": is not in the archive")};
   if (entry->size > max_size) {
-    return Error{ErrorCode::kBadFile,
-                 Cat(where, ": has ", HumanBytes(entry->size), ", more than the limit of ", HumanBytes(max_size))};
+    return Error{ErrorCode::kBadFile, Cat(where, ": has ", MoreThanLimit(entry->size, max_size))};
   }
   std::string contents;
   if (entry->method == 0) {

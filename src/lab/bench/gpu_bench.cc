@@ -443,6 +443,9 @@ Result<GpuBenchReport> BenchGpu(const DeviceChoice& choice, const GpuBenchOption
           return report;
         }
         if (!status.ok()) row.problem = status.error().message;
+        if (row.problem.find("--max-gpu-memory") != std::string::npos) {
+          row.problem += Cat("; try --max-gpu-memory ", MaxGpuMemoryOfRun() / 500'000, "M");  // twice as much
+        }
       } catch (const std::bad_alloc&) {
         row.problem = "the memory of this machine does not suffice";
       }

@@ -16,6 +16,9 @@ silent stderr
 expect 1 "partly done" "$program" convert "$scan" "$work/none.ply" --out-dir "$work/some" --to spz
 says stderr "1 of 2 files"
 says stdout "scan.spz"
+last_line() { "$program" "$@" 2>&1 | tail -n 1; }
+expect 1 "partly done, into one stream" last_line convert "$scan" "$work/none.ply" --out-dir "$work/more" --to spz
+says stdout "1 of 2 files failed"
 expect 2 "no verb" "$program"
 silent stdout
 expect 2 "a word that is no verb" "$program" convrt "$input"

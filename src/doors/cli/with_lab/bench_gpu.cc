@@ -155,6 +155,7 @@ void PrintTable(const GpuBenchReport& report, const GpuBenchOptions& options) {
   std::vector<std::vector<std::string>> table = {{"Gaussians", "size", "forward", "backward", "CPU", "CPU'", "upload",
                                                   "to host", "waiting", "pairs", "order", "> 1e-4", "gradients"}};
   for (const GpuBenchRow& row : report.rows) {
+    if (!row.problem.empty()) continue;  // told below
     const bool there = row.cpu.has_value();
     table.push_back({WithThousands(row.gaussians), SizeWord(row.width, row.height), Milliseconds(row.forward),
                      Milliseconds(row.backward), there ? Milliseconds(row.cpu->forward) : "",

@@ -65,7 +65,8 @@ nlohmann::json ToJson(const TrainReport& r) {
 
 void PrintReport(const TrainReport& r) {
   std::cout << OneLine(r.file) << ": " << WithThousands(r.parameters) << " parameters after " << WithThousands(r.steps)
-            << " steps on " << r.objects << " objects, " << HumanSeconds(r.seconds) << "\n";
+            << (r.steps == 1 ? " step on " : " steps on ") << r.objects << " objects, " << HumanSeconds(r.seconds)
+            << "\n";
   if (!r.model) return;
   std::vector<std::vector<std::string>> rows = {{"validation", "PSNR", "SSIM", "LPIPS"}};
   const auto add = [&](const char* name, const TrainQuality& q) {

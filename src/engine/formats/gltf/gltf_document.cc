@@ -12,6 +12,7 @@
 
 #include "core/rotation.h"
 #include "core/text.h"
+#include "io/size_limit.h"
 
 namespace anchorsplat {
 
@@ -172,8 +173,7 @@ Result<GltfDocument> GltfDocument::Open(const InputFile& file) {
     }
   }
   if (json_size > kMaxJson) {
-    return Error{ErrorCode::kBadFile, Cat(file.name(), ": has ", HumanBytes(json_size),
-                                          " of JSON, more than the limit of ", HumanBytes(kMaxJson))};
+    return Error{ErrorCode::kBadFile, Cat(file.name(), ": has ", MoreThanLimit(json_size, kMaxJson, " of JSON"))};
   }
   std::string text(static_cast<size_t>(json_size), '\0');
   ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(json_begin, text.data(), text.size()));

@@ -5,7 +5,7 @@
                                                                         of meshes, land, a room, photographs, pictures of splats
     scripts/reading-table.py splats --work WORK                         edits of them, and a task for every row
     scripts/reading-table.py rows   --work WORK [--jobs N]              features and gains, the most of the work
-    scripts/reading-table.py pack   --work WORK -o data/reading.jsonl.gz
+    scripts/reading-table.py pack   --work WORK -o data/reading.jsonl.gz [--extend]
 
     scripts/reading-table.py measure --work WORK --folds FOLDER         what models decide and really gain: WORK/model.jsonl
 
@@ -313,22 +313,26 @@ def row_of(work, task):
     return work / "rows" / (task["id"] + ".json")
 
 
-def lists_decisions(path):
-    """What the list of rules did that was there before there was a model, and what that gained. It cannot be asked any more."""
+def packed(path):
+    """Rows of a table; none where it is not there."""
     if not path.exists():
-        return {}
+        return []
     with gzip.open(path, "rt", encoding="utf-8") as lines:
         next(lines)
-        return {row["id"]: row["list"] for row in map(json.loads, lines) if "list" in row}
+        return [json.loads(line) for line in lines]
 
 
 def pack(arguments):
     work = arguments.work
     names = json.loads(quietly(arguments.program, "bench", "reading", HERE / "examples/biplane/input.ply", "--features",
                                "--json"))["names"]
-    list_said = lists_decisions(arguments.output)
-    rows, missing = [], []
-    for task in map(json.loads, (work / "tasks.jsonl").read_text().splitlines()):
+    before = packed(arguments.output)
+    # What the list of rules did that was there before there was a model. It cannot be asked any more.
+    list_said = {row["id"]: row["list"] for row in before if "list" in row}
+    tasks = [json.loads(task) for task in (work / "tasks.jsonl").read_text().splitlines()]
+    made = {task["original"] for task in tasks}
+    rows, missing = [row for row in before if arguments.extend and row["original"] not in made], []
+    for task in tasks:
         path = row_of(work, task)
         if not path.exists():
             missing.append(task["id"])
@@ -422,6 +426,7 @@ def main():
     parser.add_argument("--jobs", type=positive, default=2)
     parser.add_argument("--only", type=positive, help="rows: no more than so many new ones, to see how long they take")
     parser.add_argument("--partial", action="store_true", help="pack: although rows are missing")
+    parser.add_argument("--extend", action="store_true", help="pack: keep the rows of splats that are not in WORK")
     parser.add_argument("--folds", type=pathlib.Path, help="measure: what scripts/train-reading.py --folds has written")
     parser.add_argument("-o", "--output", type=pathlib.Path, default=HERE / "data/reading.jsonl.gz")
     arguments = parser.parse_args()

@@ -15,7 +15,7 @@ DOWNSCALE = 4  # of photographs
 # How posed pictures are fitted: real photographs the first way, at an eighth, and in some of the others, drawn by a hash;
 # those that are made of strangers' splats in two of the others.
 WAYS = {
-    "photographed": ["--steps", 3000, "--max-gaussians", 60000],
+    "photographed": ["--steps", 5000],
     "photographed, 1500 steps": ["--steps", 1500, "--max-gaussians", 20000],
     "photographed, 6000 steps": ["--steps", 6000, "--max-gaussians", 20000],
     "photographed, few": ["--steps", 3000, "--max-gaussians", 8000],

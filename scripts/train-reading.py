@@ -3,8 +3,9 @@
 
     scripts/train-reading.py data/reading.jsonl.gz -o models/reading.safetensors [--folds FOLDER]
 
-An ensemble of perceptrons looks at what can be seen of a splat and says its training pixel, how it was made, and what the filter
-and a network would gain at multiples of that pixel, each with how sure that is. Rows without gains teach the pixel, rows
+An ensemble of perceptrons looks at what can be seen of a splat and says its training pixel and how sure that is, how it was made,
+and what the filter and a network would gain and lose at multiples of that pixel: both are expectations, and only rows that lose
+teach what is lost. Rows without gains teach the pixel, rows
 without a pixel (strangers') how they were made. --folds: also writes FOLDER/fold-0.safetensors to fold-7, each of which has seen no mesh
 and no maker of that fold, and prints how good these are; `anchorsplat bench reading --score TABLE --folds FOLDER` decides
 every row by the one that has not seen it. The meshes of HELD_OUT are not in the model that is
@@ -25,8 +26,10 @@ FOLDS = 8
 MADE = ["classic", "antialiased", "mip", "filtered", "enhanced", "raised", "mesh", "generated"]
 TREATMENTS = [(mode, method) for mode in ("classic", "antialiased", "mip") for method in ("filter", "network")]
 MULTIPLES = 7
+OUTPUTS = "pixel provenance gains losses"  # as ReadingModel::Load checks it
 MOST_DEVIATIONS = 4  # that count, of a feature; kMostDeviations in src/engine/reading/reading_model.cc
 HIDDEN, MEMBERS, EPOCHS, BATCH = 96, 4, 90, 96
+LOSSES = 4  # weight of their squared error in training
 # Of which the model that is written has seen nothing, so that a test can ask it about them.
 HELD_OUT = ["Scopia-spiceTower", "BlendSwap-CC-BY-wardrobe2", "Scopia-futon", "Scopia-bathroom_vanity",
             "BlendSwap-CC-0-emergencySign", "Scopia-mannequinMale"]
@@ -86,7 +89,7 @@ def known(values):
 
 def learn(table, rows, mean, deviation, seed, residuals=None):
     """How sure it is it learns from `residuals` of networks that had not seen the rows: of the pixel, and of gains; else
-    from its own, which are too small."""
+    from its own, which are too small. Deviations of gains serve to weigh rows, and are not written."""
     torch.manual_seed(seed)
     z = scaled(table.x[rows], mean, deviation)
     pixel, has_pixel = known(table.pixel[rows])
@@ -95,7 +98,7 @@ def learn(table, rows, mean, deviation, seed, residuals=None):
     n, curves = len(MADE), table.gains.shape[1]
     if residuals is not None:
         of_pixels, of_gains = (torch.tensor(np.nan_to_num(r), dtype=torch.float32) for r in residuals)
-    net = Perceptron(z.shape[1], 2 + n + 2 * curves)
+    net = Perceptron(z.shape[1], 2 + n + 3 * curves)
     optimizer = torch.optim.AdamW(net.parameters(), 3e-3, weight_decay=0.1)
     batches = (len(rows) + BATCH - 1) // BATCH
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, EPOCHS * batches)
@@ -106,7 +109,7 @@ def learn(table, rows, mean, deviation, seed, residuals=None):
     for _ in range(EPOCHS):
         for batch in torch.randperm(len(rows)).split(BATCH):
             out = net(z[batch] + 0.1 * torch.randn(len(batch), z.shape[1]))
-            spread, log_deviation = out[:, 1].clamp(-3.5, 1), out[:, 2 + n + curves :].clamp(-3, 2)
+            spread, log_deviation = out[:, 1].clamp(-3.5, 1), out[:, 2 + n + 2 * curves :].clamp(-3, 2)
             off, wrong = (out[:, 0] - pixel[batch]).abs(), out[:, 2 + n : 2 + n + curves] - gains[batch]
             if residuals is None:
                 loss = mean_of(off * torch.exp(-spread) + spread, has_pixel[batch])
@@ -117,6 +120,8 @@ def learn(table, rows, mean, deviation, seed, residuals=None):
                 loss = mean_of(off * sure + unseen * torch.exp(-spread) + spread, has_pixel[batch])
                 loss = loss + mean_of(wrong**2 * surely / 2 + unseen_gains**2 * torch.exp(-2 * log_deviation) / 2 + log_deviation,
                                       has_gains[batch])
+            lost = torch.nn.functional.softplus(out[:, 2 + n + curves : 2 + n + 2 * curves])
+            loss = loss + LOSSES * mean_of((lost - gains[batch].clamp(max=0).neg()) ** 2, has_gains[batch])
             named = made[batch] >= 0
             loss = loss + 0.5 * torch.nn.functional.cross_entropy(out[named][:, 2 : 2 + n], made[batch][named])
             optimizer.zero_grad()
@@ -161,9 +166,10 @@ class Ensemble:
         tensors = {"mean": self.mean, "deviation": self.deviation, "calibration": np.array(self.calibration)}
         for k in range(3):
             layers = [net.layers[k] for net in self.nets]
-            tensors[f"layer{k}.weight"] = np.stack([layer.weight.detach().numpy() for layer in layers])
-            tensors[f"layer{k}.bias"] = np.stack([layer.bias.detach().numpy() for layer in layers])
-        header, data = {"__metadata__": {"features": " ".join(names)} | metadata}, b""
+            written = 2 + len(MADE) + 2 * MULTIPLES * len(TREATMENTS) if k == 2 else None
+            tensors[f"layer{k}.weight"] = np.stack([layer.weight.detach().numpy()[:written] for layer in layers])
+            tensors[f"layer{k}.bias"] = np.stack([layer.bias.detach().numpy()[:written] for layer in layers])
+        header, data = {"__metadata__": {"features": " ".join(names), "outputs": OUTPUTS} | metadata}, b""
         for name, values in tensors.items():
             values = values.astype("<f4" if name == "calibration" else "<f2")
             header[name] = {"dtype": "F32" if name == "calibration" else "F16", "shape": list(values.shape),
@@ -174,9 +180,24 @@ class Ensemble:
         path.write_bytes(struct.pack("<Q", len(text)) + text + data)
 
 
-def pixel_of(said):
-    """ln(pixel / unit), and half of an interval that is not calibrated."""
-    middle, spread = said[:, :, 0], np.exp(np.clip(said[:, :, 1], -3.5, 1))
+def pixel_of(table, rows, said):
+    """ln(pixel / unit), and half of an interval that is not calibrated; of a whole splat with what is said of its places, as
+    CombineWithPlaces in src/engine/reading/reading.cc does it."""
+    middle, spread = said[:, :, 0].copy(), np.exp(np.clip(said[:, :, 1], -3.5, 1))
+    log_unit = np.log([table.rows[row]["unit"] for row in rows])
+    places = {}
+    for i, row in enumerate(rows):
+        if table.rows[row]["edit"] == "place":
+            places.setdefault(table.rows[row]["id"], []).append(i)
+    for i, row in enumerate(rows):
+        own = places.get(table.rows[row]["id"], [])
+        if table.rows[row]["edit"] == "place" or len(own) < 2:
+            continue
+        pixel = np.median(said[:, own, 0] + log_unit[own], axis=1) - log_unit[i]
+        of_places = np.median(spread[:, own], axis=1)
+        share, apart = 1 / (1 + (of_places / spread[:, i]) ** 2), pixel - middle[:, i]
+        middle[:, i] += share * apart
+        spread[:, i] = np.hypot(np.minimum(spread[:, i], of_places), np.sqrt(share * (1 - share)) * apart)
     return middle.mean(0), np.hypot(spread.mean(0), middle.std(0))
 
 
@@ -200,7 +221,7 @@ def main():
     middle, half, far = np.zeros((3, len(table.rows)))
     for fold, ensemble in enumerate(folds):
         own = np.flatnonzero(table.fold == fold)
-        middle[own], half[own] = pixel_of(ensemble.say(table.x[own]))
+        middle[own], half[own] = pixel_of(table, own, ensemble.say(table.x[own]))
         far[own] = ensemble.far(table.x[own])
     error = np.abs(middle - table.pixel)
     judged = np.isfinite(error)

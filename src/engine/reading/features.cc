@@ -21,6 +21,7 @@
 #include "core/spherical_harmonics.h"
 #include "core/statistics.h"
 #include "core/text.h"
+#include "reading/places.h"
 #include "reading/splat_pictures.h"
 
 namespace anchorsplat {
@@ -117,6 +118,11 @@ Gaussians SampleOf(const GaussianCloud& visible) {
   }
   std::sort(out.areas.begin(), out.areas.end());
   return out;
+}
+
+// √(largest × middle axis) of their 10 % quantiles.
+double SmallSize(Gaussians& sample) {
+  return std::exp(0.5 * (sample.weighted[1].Quantile(0.1) + sample.weighted[2].Quantile(0.1)));
 }
 
 double SortedQuantile(std::span<const float> sorted, double q) {
@@ -472,24 +478,61 @@ const std::vector<std::string>& FeatureNames() {
   return names;
 }
 
-Result<SplatFeatures> FeaturesOf(const CloudView& whole, const VisibleGaussians& visible, bool with_pictures) {
+namespace {
+
+// `unit`: the sample's if not given.
+Result<SplatFeatures> Measure(const CloudView& whole, const VisibleGaussians& visible, std::optional<double> unit,
+                              bool with_pictures) {
   if (visible.cloud.size() < kMinGaussians) {
     return Error{ErrorCode::kBadArgument, Cat("fewer than ", kMinGaussians, " visible, small Gaussians")};
   }
   LeaveIfAbandoned();
   Gaussians sample = SampleOf(visible.cloud);
-  // √(largest × middle axis) of their 10 % quantiles.
-  const double unit = std::exp(0.5 * (sample.weighted[1].Quantile(0.1) + sample.weighted[2].Quantile(0.1)));
-  if (!(unit > 0) || !std::isfinite(unit)) {
+  SplatFeatures features{unit.value_or(SmallSize(sample)), {}, {}};
+  if (!(features.unit > 0) || !std::isfinite(features.unit)) {
     return Error{ErrorCode::kBadArgument, "the visible Gaussians have zero size"};
   }
   LeaveIfAbandoned();
   Neighbours neighbours = NeighboursOf(whole, visible);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SplatPictures pictures,
-                               with_pictures ? MeasurePictures(visible.central, unit) : UnknownPictures());
-  SplatFeatures features{unit, {}};
-  Row row(features.values, unit);
+                               with_pictures ? MeasurePictures(visible.central, features.unit) : UnknownPictures());
+  Row row(features.values, features.unit);
   AddAll(whole, visible, pictures, std::move(sample), std::move(neighbours), row);
+  return features;
+}
+
+std::vector<SplatFeatures> FeaturesOfPlaces(const CloudView& whole, const VisibleGaussians& visible) {
+  const SplatPlaces places(visible.cloud);
+  std::vector<Result<SplatFeatures>> found(static_cast<size_t>(places.count()), Error{ErrorCode::kBadArgument, ""});
+  ParallelFor(0, places.count(), 1, [&](int64_t place, int64_t) {
+    LeaveIfAbandoned();
+    std::vector<int64_t> rows = places.rows(place);
+    for (int64_t& row : rows) row = visible.rows[static_cast<size_t>(row)];
+    const auto part = Subset(whole, rows);
+    if (part.ok()) found[static_cast<size_t>(place)] = FeaturesOfPlace(*part);
+  });
+  std::erase_if(found, [](const auto& features) { return !features.ok(); });
+  std::vector<SplatFeatures> out;
+  for (auto& features : found) out.push_back(*std::move(features));
+  return out;
+}
+
+}  // namespace
+
+Result<SplatFeatures> FeaturesOfPlace(const CloudView& place) {
+  return Measure(place, FindVisibleGaussians(place), {}, /*with_pictures=*/false);
+}
+
+Result<SplatFeatures> FeaturesOf(const CloudView& whole, const VisibleGaussians& visible) {
+  std::vector<SplatFeatures> places = FeaturesOfPlaces(whole, visible);
+  std::optional<double> unit;
+  if (places.size() > 1) {
+    Buffer<float> log_units;
+    for (const SplatFeatures& place : places) log_units.push_back(static_cast<float>(std::log(place.unit)));
+    unit = std::exp(double{Quantile(log_units, 0.5)});
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(SplatFeatures features, Measure(whole, visible, unit, /*with_pictures=*/true));
+  features.places = std::move(places);
   return features;
 }
 

@@ -12,7 +12,8 @@ namespace anchorsplat {
 // Features from which a splat's provenance and training pixel size are predicted. Independent of the unit of length.
 //
 // Lengths are ln(length / unit). `unit` is the size of the small Gaussians, for most fits within a factor of three of
-// the training pixel. NaN: not available (no harmonics, no finite axis).
+// the training pixel. A whole splat's is the median over its places: by area, walls and ground that few cameras saw
+// would outweigh the subject of a capture. NaN: not available (no harmonics, no finite axis).
 //
 //   file.*      from the file: render mode (one of three or none), SH degree
 //   count.*     share of visible Gaussians, and of these that are not nearly black
@@ -31,15 +32,18 @@ namespace anchorsplat {
 struct SplatFeatures {
   double unit = 0;  // world units
   std::vector<double> values;
+  std::vector<SplatFeatures> places;  // of the places of a whole splat (reading/places.h) that can be measured
 };
 
 // Names of `values`, the same for every splat.
 const std::vector<std::string>& FeatureNames();
 
-// Computes features. `visible`: FindVisibleGaussians(whole). Pictures take nearly all of the time; without them outline
-// and detail are NaN.
+// Computes features. `visible`: FindVisibleGaussians(whole). Pictures take most of the time.
 // Errors: kBadArgument if fewer than kMinGaussians are visible; those of rendering.
-Result<SplatFeatures> FeaturesOf(const CloudView& whole, const VisibleGaussians& visible, bool with_pictures = true);
+Result<SplatFeatures> FeaturesOf(const CloudView& whole, const VisibleGaussians& visible);
 Result<SplatFeatures> FeaturesOf(const CloudView& whole);
+
+// Features of the Gaussians of one place, without pictures: outline and detail are NaN.
+Result<SplatFeatures> FeaturesOfPlace(const CloudView& place);
 
 }  // namespace anchorsplat

@@ -90,6 +90,19 @@ TEST(Features, OutlinesFallInUnitsOfTheSize) {
   EXPECT_GT(at("outline[-3].classic6"), at("outline[3].classic6"));
 }
 
+TEST(Features, TheUnitIsThatOfMostPlacesNotOfMostOfTheArea) {
+  const GaussianCloud subject = Sphere(8000);
+  GaussianCloud walls = Sphere(1000, 3, 2);  // of 9000 Gaussians, with most of the area
+  for (size_t k = 0; k < walls.means.size(); k += 3) walls.means[k] += 5;
+  for (float& x : walls.log_scales) x = std::log(0.2f);
+  for (float& logit : walls.opacity_logits) logit = 3;
+  GaussianCloud both = subject;
+  ASSERT_TRUE(Append(both, walls).ok());
+  const auto alone = FeaturesOf(subject), with_walls = FeaturesOf(both);
+  ASSERT_TRUE(alone.ok() && with_walls.ok());
+  EXPECT_NEAR(with_walls->unit / alone->unit, 1, 0.1);
+}
+
 TEST(Features, NeedGaussiansThatShow) {
   GaussianCloud cloud = Sphere(200);
   for (float& logit : cloud.opacity_logits) logit = LogitFromOpacity(0.01f);

@@ -65,7 +65,7 @@ double LogPixelOf(const CloudView& cloud, std::span<const int64_t> rows, const R
   constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   const auto part = Subset(cloud, rows);
   if (!part.ok()) return kUnknown;
-  const auto features = FeaturesOf(*part, FindVisibleGaussians(*part), /*with_pictures=*/false);
+  const auto features = FeaturesOfPlace(*part);
   if (!features.ok()) return kUnknown;
   const std::vector<ReadingPrediction> predictions = model.Predict(features->values);
   double sum = std::log(features->unit);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/statistics.h"
 #include "core/text.h"
 
 namespace anchorsplat {
@@ -11,7 +12,7 @@ Provenance Reading::likeliest() const {
   double full_width = 0;
   for (size_t k = 0; k < kProvenanceCount; ++k)
     full_width += HasFullWidth(static_cast<Provenance>(k)) ? provenance[k] : 0;
-  const bool has_full_width = full_width > kLossWeight * (1 - full_width);
+  const bool has_full_width = full_width > kFinishedWeight * (1 - full_width);
   size_t best = kProvenanceCount;
   for (size_t k = 0; k < kProvenanceCount; ++k) {
     if (HasFullWidth(static_cast<Provenance>(k)) != has_full_width) continue;
@@ -25,6 +26,34 @@ std::string DescribeProvenance(const Reading& reading) {
   return Cat(Describe(made), " (", std::lround(100 * std::min(reading.probability(made), 0.99)), " %)");
 }
 
+namespace {
+
+// Combines the pixel read off the whole with the median of those read off its places, by their precision. Their errors
+// are alike, so agreement makes the result no more certain than the more certain one; disagreement makes it less so.
+void CombineWithPlaces(const SplatFeatures& whole, const ReadingModel& model,
+                       std::vector<ReadingPrediction>& predictions) {
+  if (whole.places.size() < 2) return;
+  std::vector<Buffer<float>> pixels(predictions.size()), spreads(predictions.size());
+  for (const SplatFeatures& place : whole.places) {
+    const std::vector<ReadingPrediction> own = model.Predict(place.values);
+    for (size_t m = 0; m < own.size(); ++m) {
+      pixels[m].push_back(static_cast<float>(own[m].log_pixel + std::log(place.unit / whole.unit)));
+      spreads[m].push_back(static_cast<float>(own[m].log_spread));
+    }
+  }
+  for (size_t m = 0; m < predictions.size(); ++m) {
+    ReadingPrediction& prediction = predictions[m];
+    const double pixel{Quantile(pixels[m], 0.5)}, log_spread{Quantile(spreads[m], 0.5)};
+    const double share = 1 / (1 + std::exp(2 * (log_spread - prediction.log_spread)));
+    const double apart = pixel - prediction.log_pixel;
+    prediction.log_pixel += share * apart;
+    prediction.log_spread = std::log(std::hypot(std::exp(std::min(prediction.log_spread, log_spread)),
+                                                std::sqrt(share * (1 - share)) * apart));
+  }
+}
+
+}  // namespace
+
 Reading ReadFrom(const SplatFeatures& features, const ReadingModel& model) {
   Reading reading;
   reading.unit = features.unit;
@@ -33,6 +62,7 @@ Reading ReadFrom(const SplatFeatures& features, const ReadingModel& model) {
       static_cast<size_t>(std::ranges::find(FeatureNames(), "count.share_showing") - FeatureNames().begin());
   reading.visible_share = features.values[share];
   reading.predictions = model.Predict(features.values);
+  CombineWithPlaces(features, model, reading.predictions);
   const auto members = static_cast<double>(reading.predictions.size());
   double middle = 0, spread = 0, apart = 0;
   for (const ReadingPrediction& prediction : reading.predictions) {

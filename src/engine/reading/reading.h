@@ -16,8 +16,9 @@ namespace anchorsplat {
 
 // Weight of a lost decibel against a gained one, chosen so that at most about 2 % of splats lose 0.1 dB
 // (docs/reading.md).
-// Likewise of wrongly leaving a splat alone against wrongly enhancing it.
-inline constexpr double kLossWeight = 8;
+inline constexpr double kLossWeight = 4;
+// Likewise of wrongly taking a splat for finished against the opposite.
+inline constexpr double kFinishedWeight = 8;
 
 // What a splat reveals about itself: its provenance, its training pixel size, and what would improve it. Predicted by a
 // model trained on splats with known answers (docs/reading.md).
@@ -31,7 +32,7 @@ struct Reading {
   std::vector<ReadingPrediction> predictions;
 
   // The assumed provenance: the most likely one. Having full width counts only if those provenances together have 89 %,
-  // because wrongly leaving a splat alone weighs kLossWeight times.
+  // because the opposite error weighs kFinishedWeight times less.
   Provenance likeliest() const;
   double probability(Provenance of) const { return provenance[static_cast<size_t>(of)]; }
 };

@@ -23,9 +23,11 @@ namespace anchorsplat {
 namespace {
 
 constexpr float kMostDeviations = 4;  // standardised features are clamped to this
+constexpr std::string_view kOutputs = "pixel provenance gains losses";
 constexpr size_t kPredictionValues = 2 + kProvenanceCount + 2 * kGainCount * kGainMultiples.size();
 
 float Silu(float x) { return x / (1 + std::exp(-x)); }
+double Softplus(double x) { return std::max(x, 0.0) + std::log1p(std::exp(-std::abs(x))); }
 
 Result<std::vector<float>> ReadAll(const TensorFile& file, std::string_view name, std::span<const int64_t> shape) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values values, file.ReadFloat32(name, shape));
@@ -41,8 +43,8 @@ ReadingPrediction PredictionFrom(std::span<const float> said) {
   for (auto& curve : prediction.gains) {
     for (double& gain : curve) gain = double{*next++};
   }
-  for (auto& curve : prediction.log_deviations) {
-    for (double& deviation : curve) deviation = std::clamp(double{*next++}, -3.0, 2.0);
+  for (auto& curve : prediction.losses) {
+    for (double& loss : curve) loss = Softplus(double{*next++});
   }
   return prediction;
 }
@@ -93,6 +95,10 @@ Result<ReadingModel> ReadingModel::Load(const TensorFile& file) {
   if (features == file.metadata().end() || features->second != expected) {
     return Error{ErrorCode::kBadFile,
                  Cat(file.name(), ": this program does not compute the features it was trained on")};
+  }
+  const auto outputs = file.metadata().find("outputs");
+  if (outputs == file.metadata().end() || outputs->second != kOutputs) {
+    return Error{ErrorCode::kBadFile, Cat(file.name(), ": its outputs must be '", kOutputs, "'")};
   }
   const auto inputs = static_cast<int64_t>(names.size());
   ANCHORSPLAT_ASSIGN_OR_RETURN(model.mean_, ReadAll(file, "mean", std::array{inputs}));

@@ -33,8 +33,8 @@ struct ReadingPrediction {
   double log_pixel = 0;                           // ln(training pixel / unit)
   double log_spread = 0;                          // ln of the mean absolute error of log_pixel
   std::array<double, kProvenanceCount> logits{};  // of Provenance
-  // SquashGain(gain in dB), and ln of its standard deviation.
-  std::array<std::array<double, kGainMultiples.size()>, kGainCount> gains{}, log_deviations{};
+  // Expectations of SquashGain(gain in dB), and of its part below zero, sign changed.
+  std::array<std::array<double, kGainMultiples.size()>, kGainCount> gains{}, losses{};
 };
 
 // Compresses gains: logarithmic beyond a few dB.
@@ -44,7 +44,7 @@ double SquashGain(double decibels);
 // (scripts/train-reading.py).
 class ReadingModel {
  public:
-  // Errors (kBadFile): missing tensors or wrong shapes; features other than FeatureNames().
+  // Errors (kBadFile): missing tensors or wrong shapes; features other than FeatureNames(); other outputs.
   static Result<ReadingModel> Load(const TensorFile& file);
   // The model built into the program.
   static const ReadingModel& Shipped();

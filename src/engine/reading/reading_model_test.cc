@@ -20,7 +20,7 @@ constexpr int64_t kMembers = 2, kHidden = 5, kOutputs = 2 + 8 + 2 * 6 * 7;
 
 struct Weights {
   std::map<std::string, std::pair<std::vector<int64_t>, std::vector<float>>> tensors;
-  std::string names;
+  std::string names, outputs = "pixel provenance gains losses";
 
   Weights() {
     Random random(7);
@@ -48,7 +48,7 @@ struct Weights {
   Result<ReadingModel> Load(const std::filesystem::path& path) const {
     std::vector<TensorEntry> entries;
     for (const auto& [name, tensor] : tensors) entries.push_back(MakeEntry(name, tensor.first, tensor.second));
-    const Status written = WriteSafetensors(path, entries, {{"features", names}}, {.overwrite = true});
+    const Status written = WriteSafetensors(path, entries, {{"features", names}, {"outputs", outputs}}, {.overwrite = true});
     if (!written.ok()) return written.error();
     ANCHORSPLAT_ASSIGN_OR_RETURN(const TensorFile file, TensorFile::Open(path));
     return ReadingModel::Load(file);
@@ -103,7 +103,7 @@ TEST_F(ReadingModelTest, SaysWhatThePlainReferenceSays) {
     for (size_t t = 0; t < kGainCount; ++t) {
       for (size_t k = 0; k < 7; ++k) {
         EXPECT_NEAR(said.gains[t][k], expected[10 + 7 * t + k], 1e-4);
-        EXPECT_NEAR(said.log_deviations[t][k], std::clamp(expected[10 + 42 + 7 * t + k], -3.0, 2.0), 1e-4);
+        EXPECT_NEAR(said.losses[t][k], std::log(1 + std::exp(expected[10 + 42 + 7 * t + k])), 1e-4);
       }
     }
   }
@@ -114,6 +114,9 @@ TEST_F(ReadingModelTest, RefusesOtherFeaturesAndShapes) {
   Weights weights;
   weights.names += " more";
   EXPECT_EQ(weights.Load(folder_ / "a.safetensors").error().code, ErrorCode::kBadFile);
+  Weights of_deviations;  // as before there were losses, of the same shapes
+  of_deviations.outputs = "pixel provenance gains deviations";
+  EXPECT_EQ(of_deviations.Load(folder_ / "a.safetensors").error().code, ErrorCode::kBadFile);
   for (const auto& [name, tensor] : Weights().tensors) {
     Weights without;
     without.tensors.erase(name);

@@ -53,6 +53,24 @@ TEST(Reading, FollowsTheScaleOfTheSplat) {
   }
 }
 
+TEST(Reading, GoesByTheMoreCertainOfTheWholeAndItsPlaces) {
+  const ReadingModel& model = ReadingModel::Shipped();
+  SplatFeatures whole = FeaturesOf(Example("biplane")).value();
+  ASSERT_GT(whole.places.size(), 2);
+  whole.places.clear();
+  const Reading alone = ReadFrom(whole, model);
+  SplatFeatures same = whole;
+  whole.places = {same, same, same};
+  EXPECT_NEAR(ReadFrom(whole, model).pixel, alone.pixel, 1e-4 * alone.pixel) << "they say the same";
+  for (SplatFeatures& place : whole.places) place.unit *= 4;  // as certain as the whole
+  const Reading between = ReadFrom(whole, model);
+  EXPECT_NEAR(between.pixel, 2 * alone.pixel, 1e-3 * alone.pixel);
+  EXPECT_NEAR(std::exp(between.predictions.front().log_spread),
+              std::hypot(std::exp(alone.predictions.front().log_spread), std::log(2)), 1e-4);
+  whole.places.resize(1);
+  EXPECT_EQ(ReadFrom(whole, model).pixel, alone.pixel) << "one place is the whole";
+}
+
 // AVX2, AVX-512 and what a page runs on: the pixels that are drawn differ by rounding alone.
 TEST(Reading, LeadsToTheSameTreatmentOnEveryProcessor) {
   for (const char* name : {"biplane", "stone_lantern", "tankard"}) {

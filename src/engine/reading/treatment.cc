@@ -18,15 +18,13 @@ constexpr std::array<double, 5> kParts = {-1.609, -0.511, 0, 0.511, 1.609};
 
 double UnsquashGain(double squashed) { return 2 * std::sinh(squashed / 2); }
 
-constexpr double kLeast = 1e-6;  // lower bound of deviations
-
-struct Curve {
-  double gain, deviation;
+struct Expectation {
+  double gain = 0, loss = 0;  // expectations of the squashed gain, and of its part below zero, sign changed
 };
 
-// Predicted gain at a multiple of the true pixel (given as ln). Below the measured multiples it falls to zero with the
-// square, above them it falls on linearly.
-Curve At(const ReadingPrediction& prediction, size_t treatment, double log_multiple) {
+// Predicted at a multiple of the true pixel (given as ln). Below the measured multiples both fall to zero with the
+// square; above them the gain falls on linearly, and what it falls is lost.
+Expectation At(const ReadingPrediction& prediction, size_t treatment, double log_multiple) {
   constexpr size_t kLast = kGainMultiples.size() - 1;
   static const std::array<double, kLast + 1> multiples = [] {
     std::array<double, kLast + 1> out;
@@ -34,31 +32,20 @@ Curve At(const ReadingPrediction& prediction, size_t treatment, double log_multi
     return out;
   }();
   const auto& gains = prediction.gains[treatment];
-  const auto& deviations = prediction.log_deviations[treatment];
+  const auto& losses = prediction.losses[treatment];
   if (log_multiple < multiples[0]) {
     const double share = std::exp(2 * (log_multiple - multiples[0]));
-    return {gains[0] * share, std::exp(deviations[0]) * share + kLeast};
+    return {gains[0] * share, losses[0] * share};
   }
   if (log_multiple > multiples[kLast]) {
     const double slope = std::min(-1.0, (gains[kLast] - gains[kLast - 1]) / (multiples[kLast] - multiples[kLast - 1]));
-    return {gains[kLast] + slope * (log_multiple - multiples[kLast]), std::exp(deviations[kLast])};
+    const double fall = slope * (log_multiple - multiples[kLast]);
+    return {gains[kLast] + fall, losses[kLast] - fall};
   }
   size_t k = 0;
   while (k + 2 < multiples.size() && log_multiple > multiples[k + 1]) ++k;
   const double part = (log_multiple - multiples[k]) / (multiples[k + 1] - multiples[k]);
-  return {gains[k] * (1 - part) + gains[k + 1] * part,
-          std::exp(deviations[k]) * (1 - part) + std::exp(deviations[k + 1]) * part};
-}
-
-struct Expectation {
-  double gain = 0, loss = 0;  // expectations of the squashed gain, and of its negative part
-};
-
-// Mean of the part below zero of a normal distribution.
-double MeanLoss(const Curve& of) {
-  const double u = of.gain / of.deviation;
-  const double density = std::exp(-0.5 * u * u) / std::sqrt(2 * std::numbers::pi);
-  return of.deviation * density - of.gain * 0.5 * std::erfc(u / std::numbers::sqrt2);
+  return {gains[k] * (1 - part) + gains[k + 1] * part, losses[k] * (1 - part) + losses[k + 1] * part};
 }
 
 // Expectation over ensemble members and the pixel sizes each considers possible.
@@ -69,9 +56,9 @@ Expectation Expect(const Reading& reading, size_t treatment, double log_size, bo
     for (const double part : kParts) {
       // A known pixel is the true one, so the multiple is exact.
       const double off = is_known ? 0 : log_size - prediction.log_pixel - std::exp(prediction.log_spread) * part;
-      const Curve at = At(prediction, treatment, off);
+      const Expectation at = At(prediction, treatment, off);
       sum.gain += weight * at.gain;
-      sum.loss += weight * MeanLoss(at);
+      sum.loss += weight * at.loss;
       if (is_known) break;
     }
   }

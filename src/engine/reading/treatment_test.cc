@@ -25,7 +25,7 @@ Reading ReadingOf(double pixel, double spread, const std::array<double, 7>& netw
     for (size_t t = 0; t < kGainCount; ++t) {
       const double of_antialiased = t < 2 ? 0 : -1;  // it is a classic one
       prediction.gains[t][k] = SquashGain((t % 2 == 1 ? network : filter)[k]) + of_antialiased;
-      prediction.log_deviations[t][k] = -3;
+      prediction.losses[t][k] = std::max(0.0, -prediction.gains[t][k]);
     }
   }
   return reading;

@@ -342,7 +342,7 @@ Result<nlohmann::json> PlacesOf(const GaussianCloud& cloud, const Buffer<float>&
     Buffer<float> own;
     for (const int64_t i : rows) own.push_back(pixels[static_cast<size_t>(i)]);
     ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud part, Subset(cloud, rows));
-    const auto features = FeaturesOf(part, FindVisibleGaussians(part), /*with_pictures=*/false);
+    const auto features = FeaturesOfPlace(part);
     if (!features.ok()) continue;
     out.push_back({{"unit", features->unit},
                    {"pixel", QuantileOf(std::move(own), 0.5)},

@@ -53,6 +53,14 @@ ReadingDecision TodaysDecision(const json& today) {
   return decision;
 }
 
+SplatFeatures FeaturesIn(const json& object) {
+  SplatFeatures features{NumberAt(object, "unit"), {}, {}};
+  for (const json& value : object.at("features")) {
+    features.values.push_back(value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>());
+  }
+  return features;
+}
+
 ReadingRow RowFrom(const json& object) {
   ReadingRow row;
   row.id = object.at("id").get<std::string>();
@@ -79,10 +87,8 @@ ReadingRow RowFrom(const json& object) {
   if (object.contains("list")) row.today = TodaysDecision(object.at("list"));
   row.fold = static_cast<int>(NumberAt(object, "fold"));
   if (object.contains("features")) {
-    row.features.unit = NumberAt(object, "unit");
-    for (const json& value : object.at("features")) {
-      row.features.values.push_back(value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>());
-    }
+    row.features = FeaturesIn(object);
+    for (const json& place : object.value("places", json::array())) row.features.places.push_back(FeaturesIn(place));
   }
   return row;
 }
@@ -115,10 +121,11 @@ Result<std::vector<ReadingRow>> ReadReadingTable(const fs::path& path) {
   ANCHORSPLAT_RETURN_IF_ERROR(ForEachJsonLine(path, [&](const json& object, int64_t line) -> std::string {
     if (line > 1) {
       const ReadingRow& row = rows.emplace_back(RowFrom(object));
-      const size_t values = row.features.values.size();
-      return values == 0 || values == FeatureNames().size()
-                 ? ""
-                 : "has another number of features than the first line names";
+      const size_t values = row.features.values.size(), named = FeatureNames().size();
+      const bool agree = std::ranges::all_of(row.features.places,
+                                             [&](const SplatFeatures& place) { return place.values.size() == named; });
+      return agree && (values == 0 || values == named) ? ""
+                                                       : "has another number of features than the first line names";
     }
     const std::vector<double> multiples(kGainMultiples.begin(), kGainMultiples.end());
     const bool known = object.at("table") == "readings" && object.at("multiples") == json(multiples) &&

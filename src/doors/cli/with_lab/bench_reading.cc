@@ -261,14 +261,13 @@ Status Score(const ReadingFlags& flags, const SharedFlags& shared) {
   std::cout << FormatTable(overall) << "\n";
   std::cout
       << "mean, worst, 2 % quantile: gain over the splat as it is, dB; lose: rows that lose more than " << kReadingLoss
-      << "\nheld: intervals that hold the true pixel; width: their upper end divided by their lower end, mean of "
-         "logarithms\n"
-         "known: of splats without a tag, the share that is taken for what it is\n"
-         "accused: of splats without a tag that have lost width, the share that is taken for widened or enhanced\n"
+      << "\nheld: intervals that hold the true pixel; width: upper over lower end, geometric mean\n"
+         "known: untagged splats recognised\n"
+         "accused: untagged splats with lost width that are taken for widened or enhanced\n"
          "s: seconds before the method begins, median\n"
-         "true: the mean gain where the true pixel is known; best: that of the best of all that was measured\n"
-      << "curves are off by " << Fixed(error.median, 2) << " dB in the median and " << Fixed(error.most, 2)
-      << " dB at the 95th percentile, of " << WithThousands(error.rows) << " decisions that were measured, too\n";
+         "true: mean gain with the true pixel; best: of the best measured method\n"
+      << "interpolated gains are off by " << Fixed(error.median, 2) << " dB in the median and " << Fixed(error.most, 2)
+      << " dB at the 95th percentile, over " << WithThousands(error.rows) << " measured decisions\n";
   return {};
 }
 
@@ -290,30 +289,30 @@ Status RunReading(const ReadingFlags& flags, Program& program) {
 
 void AddReadingBench(CLI::App& bench, Program& program) {
   CLI::App& verb =
-      AddVerb(bench, program, "reading", "What splats show before they are enhanced, and who reads it best",
+      AddVerb(bench, program, "reading", "Measure the estimates from splats",
               "anchorsplat bench reading --score data/reading.jsonl.gz");
   const auto flags = std::make_shared<ReadingFlags>();
   verb.add_option("splats", flags->splats, "Splat files");
-  verb.add_flag("--features", flags->features, "All numbers that tell how a splat was made and what it has lost");
+  verb.add_flag("--features", flags->features, "Print the model's input for these splats");
   CLI::Option* const tasks = verb.add_option("--tasks", flags->tasks,
-                                             "Make rows of the table: JSON lines, as scripts/reading-table.py writes");
+                                             "Make rows of the table for these splats (JSON lines by scripts/reading-table.py)");
   tasks->needs(verb.add_option("-o,--output", flags->output,
-                               "Folder of the rows, a file each; one of the same task and files is not made again")
+                               "Folder for a file per row; existing rows of unchanged splats are kept")
                    ->needs(tasks)
                    ->check(NotEmpty()));
-  verb.add_option("--views", flags->views, "Held-out views that gains are measured in")
+  verb.add_option("--views", flags->views, "Held-out views per gain")
       ->needs(tasks)
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   CLI::Option* const table = verb.add_option(
-      "--score", flags->table, "A table: how well the list of rules decided that was there before, and bounds");
-  verb.add_option("--decisions", flags->decisions, "JSON lines of another decider, to stand beside it")->needs(table);
+      "--score", flags->table, "Table to score: what the rules before the model gained, and what is possible");
+  verb.add_option("--decisions", flags->decisions, "Also score these decisions (JSON lines)")->needs(table);
   CLI::Option* const folds =
       verb.add_option("--folds", flags->folds,
-                      "Folder of models that have not seen a fold each (scripts/train-reading.py): how they decide it")
+                      "Also score these models, each on the fold it has not seen (folder by scripts/train-reading.py)")
           ->needs(table);
   verb.add_option("--losses-count", flags->loss_weight,
-                  "With --folds: how much more a decibel that is lost counts than one that is gained")
+                  "With --folds: weight of a lost decibel against a gained one")
       ->needs(folds)
       ->check(NotNegative())
       ->capture_default_str();

@@ -15,9 +15,7 @@ namespace anchorsplat {
 
 // Default maximum cost of a merge (MergeCost): closer-view pixels × squared colour difference, colours 0–1. Chosen on
 // training objects (docs/benchmarks.md#copies).
-inline constexpr double kMergeCost = 1e-4;
-// Default for the network for standard fits, which lose less per removed Gaussian.
-inline constexpr double kMergeCostOfStandard = 1e-3;
+inline constexpr double kMergeCost = 3e-4;
 // Default when refinement follows: its starting splat must show everything and is densified again.
 inline constexpr double kMergeCostOfStart = 2e-5;
 

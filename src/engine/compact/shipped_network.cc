@@ -11,16 +11,12 @@
 #include "tensors/tensor_file.h"
 
 #ifdef ANCHORSPLAT_SHIPPED_NETWORKS
-ANCHORSPLAT_INCLUDE_BYTES("anchorsplat_shipped_standard",
-                          ANCHORSPLAT_SHIPPED_NETWORKS "/anchorsplat-compact.safetensors");
 ANCHORSPLAT_INCLUDE_BYTES("anchorsplat_shipped_classic",
-                          ANCHORSPLAT_SHIPPED_NETWORKS "/anchorsplat-classic.safetensors");
+                          ANCHORSPLAT_SHIPPED_NETWORKS "/anchorsplat-compact.safetensors");
 ANCHORSPLAT_INCLUDE_BYTES("anchorsplat_shipped_single", ANCHORSPLAT_SHIPPED_NETWORKS "/anchorsplat-single.safetensors");
 ANCHORSPLAT_INCLUDE_BYTES("anchorsplat_shipped_antialiased",
                           ANCHORSPLAT_SHIPPED_NETWORKS "/anchorsplat-antialiased.safetensors");
 extern "C" {
-extern const std::byte anchorsplat_shipped_standard[];
-extern const std::byte anchorsplat_shipped_standard_end[];
 extern const std::byte anchorsplat_shipped_classic[];
 extern const std::byte anchorsplat_shipped_classic_end[];
 extern const std::byte anchorsplat_shipped_single[];
@@ -37,8 +33,6 @@ namespace {
 std::span<const std::byte> ShippedBytes([[maybe_unused]] Shipped which) {
 #ifdef ANCHORSPLAT_SHIPPED_NETWORKS
   switch (which) {
-    case Shipped::kStandard:
-      return {anchorsplat_shipped_standard, anchorsplat_shipped_standard_end};
     case Shipped::kClassic:
       return {anchorsplat_shipped_classic, anchorsplat_shipped_classic_end};
     case Shipped::kSingle:
@@ -54,7 +48,7 @@ std::span<const std::byte> ShippedBytes([[maybe_unused]] Shipped which) {
 
 }  // namespace
 
-bool HasShippedNetwork() { return !ShippedBytes(Shipped::kStandard).empty(); }
+bool HasShippedNetwork() { return !ShippedBytes(Shipped::kClassic).empty(); }
 
 std::string ShippedNetworkIdentity() {
   if (!HasShippedNetwork()) return "";

@@ -9,13 +9,11 @@
 namespace anchorsplat {
 
 // The networks built into the program from models/ of the source tree (docs/network.md). A build has all or none.
-//   kStandard     anchorsplat-compact.safetensors      splats like standard fits
-//   kClassic      anchorsplat-classic.safetensors      other classic splats
+//   kClassic      anchorsplat-compact.safetensors      classic splats
 //   kSingle       anchorsplat-single.safetensors       classic splats, one Gaussian per Gaussian
 //   kAntialiased  anchorsplat-antialiased.safetensors  render modes that compensate the dilation (IsCompensated)
-enum class Shipped { kStandard, kClassic, kSingle, kAntialiased };
-inline constexpr Shipped kAllShipped[] = {Shipped::kStandard, Shipped::kClassic, Shipped::kSingle,
-                                          Shipped::kAntialiased};
+enum class Shipped { kClassic, kSingle, kAntialiased };
+inline constexpr Shipped kAllShipped[] = {Shipped::kClassic, Shipped::kSingle, Shipped::kAntialiased};
 
 bool HasShippedNetwork();
 
@@ -23,6 +21,6 @@ bool HasShippedNetwork();
 std::string ShippedNetworkIdentity();
 
 // Errors: kNotFound in a build without networks; those of LoadCompactNetwork.
-Result<CompactNetwork> LoadShippedNetwork(Shipped which = Shipped::kStandard);
+Result<CompactNetwork> LoadShippedNetwork(Shipped which = Shipped::kClassic);
 
 }  // namespace anchorsplat

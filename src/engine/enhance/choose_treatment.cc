@@ -308,10 +308,7 @@ Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceI
   const bool part_alone = options.region && input.partly_enhanced;
   const ReadingModel& model = options.reading_model == nullptr ? ReadingModel::Shipped() : *options.reading_model;
   const auto reading = part_alone ? ReadInside(*options.region, cloud, model) : Read(cloud, model);
-  if (reading.ok()) {
-    report.reading = *reading;
-    input.visible_share = reading->visible_share;
-  }
+  if (reading.ok()) report.reading = *reading;
   const bool with_pictures = plan.method->takes_start && !options.refine.images.empty();
   ANCHORSPLAT_ASSIGN_OR_RETURN(KnownPixels known,
                                FindKnownPixels(options, with_pictures, said, reading, input, report));

@@ -134,7 +134,6 @@ struct EnhanceInput {
   GaussianCloud cloud;
   Buffer<float> pixel_sizes;  // p_LR, world units, one for all or one per Gaussian
   double pixel_size = 0;      // their median
-  double visible_share = 1;   // Reading::visible_share; 1 if nothing was read
   double filter_strength = 0;
   std::vector<char> by_network;   // [N] whether to use the network for each Gaussian; empty: for all
   bool partly_enhanced = false;   // another part is marked as enhanced, so only Gaussians inside count for readings

@@ -29,8 +29,6 @@ namespace anchorsplat {
 
 namespace {
 
-// Standard fits show at least this share of their Gaussians (Reading::visible_share); most other splats show less.
-constexpr double kStandardVisibleShare = 0.6;
 // Shares from which the log mentions Gaussians unlike training, and warns.
 constexpr double kNotable = 0.01, kMost = 0.5;
 
@@ -83,7 +81,7 @@ Result<AnyNetwork> Load(const ModelSettings& model, Shipped shipped) {
 class LastNetwork {
  public:
   // `shipped`: used if no file is named.
-  Result<std::shared_ptr<const AnyNetwork>> Get(const ModelSettings& model, Shipped shipped = Shipped::kStandard) {
+  Result<std::shared_ptr<const AnyNetwork>> Get(const ModelSettings& model, Shipped shipped = Shipped::kClassic) {
     const std::lock_guard lock(mutex_);
     // Taken before reading, so that a change meanwhile is noticed by the next call.
     const std::optional<FileVersion> version = VersionOf(model.file);
@@ -102,7 +100,7 @@ class LastNetwork {
  private:
   std::mutex mutex_;
   std::filesystem::path file_;
-  Shipped shipped_ = Shipped::kStandard;
+  Shipped shipped_ = Shipped::kClassic;
   std::optional<FileVersion> version_;
   WeightPrecision precision_ = WeightPrecision::kFloat;
   std::shared_ptr<const AnyNetwork> network_;
@@ -111,14 +109,11 @@ class LastNetwork {
 Shipped ShippedFor(const EnhanceInput& input, const ModelSettings& model) {
   if (IsCompensated(input.cloud.render_mode)) return Shipped::kAntialiased;
   // 0.6 dB better than merging four copies into one, over fifteen fits (docs/benchmarks.md#one-for-one).
-  if (model.copies == 1) return Shipped::kSingle;
-  return input.visible_share >= kStandardVisibleShare ? Shipped::kStandard : Shipped::kClassic;
+  return model.copies == 1 ? Shipped::kSingle : Shipped::kClassic;
 }
 
-// Benefit: large for dense splats; none for standard fits unless a budget leaves few copies of each.
 bool WantsStandIns(Shipped shipped, const EnhanceInput& input, const ModelSettings& model) {
-  const bool pays = shipped == Shipped::kClassic || (shipped == Shipped::kStandard && model.options.max_gaussians > 0);
-  return model.file.empty() && pays && !model.copies && !input.is_refined;
+  return model.file.empty() && shipped == Shipped::kClassic && !model.copies && !input.is_refined;
 }
 
 }  // namespace
@@ -257,17 +252,9 @@ EnhanceMethod ModelMethod() {
         if (WantsStandIns(shipped, input, options.model)) {
           ANCHORSPLAT_ASSIGN_OR_RETURN(stand_in, last_stand_in->Get(options.model, Shipped::kSingle));
         }
-        ModelSettings model = options.model;
-        if (model.file.empty() && shipped == Shipped::kStandard && !input.is_refined && !model.merge_cost) {
-          model.merge_cost = kMergeCostOfStandard;
-        }
-        Result<GaussianCloud> out = EnhanceWithCompactNetwork(
-            std::move(input), options.upscale, std::get<CompactNetwork>(*network), model, report, options.control,
-            stand_in ? std::get_if<CompactNetwork>(stand_in.get()) : nullptr);
-        if (options.model.file.empty()) {
-          report.facts.emplace_back("network_for_standard_fits", shipped == Shipped::kStandard);
-        }
-        return out;
+        return EnhanceWithCompactNetwork(std::move(input), options.upscale, std::get<CompactNetwork>(*network),
+                                         options.model, report, options.control,
+                                         stand_in ? std::get_if<CompactNetwork>(stand_in.get()) : nullptr);
       }};
 }
 

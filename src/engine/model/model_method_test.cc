@@ -368,35 +368,29 @@ TEST_F(SmallModel, OneForOneComesFromANetworkOfItsOwn) {
   if (!HasShippedNetwork()) GTEST_SKIP() << "this program was built without weights";
   const EnhanceMethod& method = AllMethods().back();
   struct Case {
-    double visible_share;
     std::optional<int64_t> copies;
     int64_t made;  // of each
-    bool standard;
   };
-  for (const Case& c : {Case{0.2, {}, 4, false}, Case{0.2, 1, 1, false}, Case{0.2, 4, 4, false}, Case{0.9, {}, 4, true},
-                        Case{0.9, 1, 1, false}, Case{0.9, 2, 4, true}}) {
+  for (const Case& c : {Case{{}, 4}, Case{1, 1}, Case{2, 4}, Case{4, 4}}) {
     EnhanceInput input = SheetInput();
-    input.visible_share = c.visible_share;
     EnhanceOptions options;
     options.model.copies = c.copies;
     StepReport report;
     const auto enhanced = method.run(input, options, report);
     ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
     const std::map<std::string, FactValue> facts(report.facts.begin(), report.facts.end());
-    EXPECT_EQ(std::get<int64_t>(facts.at("copies")), c.made) << c.visible_share;
-    EXPECT_EQ(std::get<bool>(facts.at("network_for_standard_fits")), c.standard) << c.visible_share;
+    EXPECT_EQ(std::get<int64_t>(facts.at("copies")), c.made);
     if (c.copies) {
       EXPECT_EQ(enhanced->size(), *c.copies * input.cloud.size());
     }
   }
 }
 
-// What a merge may cost by default: more for standard fits, little for what refinement begins with.
-TEST_F(SmallModel, WhatAMergeMayCostDependsOnTheNetwork) {
+// Little for what refinement begins with.
+TEST_F(SmallModel, WhatAMergeMayCostDependsOnWhatFollows) {
   if (!HasShippedNetwork()) GTEST_SKIP() << "this program was built without weights";
-  const auto made = [](double visible_share, bool is_refined, std::optional<double> cost) {
+  const auto made = [](bool is_refined, std::optional<double> cost) {
     EnhanceInput input = SheetInput();
-    input.visible_share = visible_share;
     input.is_refined = is_refined;
     EnhanceOptions options;
     options.model.merge_cost = cost;
@@ -405,11 +399,9 @@ TEST_F(SmallModel, WhatAMergeMayCostDependsOnTheNetwork) {
     EXPECT_TRUE(enhanced.ok());
     return enhanced.ok() ? enhanced->size() : 0;
   };
-  EXPECT_EQ(made(0.9, false, {}), made(0.9, false, kMergeCostOfStandard));
-  EXPECT_LT(made(0.9, false, {}), made(0.9, false, kMergeCost));
-  EXPECT_EQ(made(0.2, false, {}), made(0.2, false, kMergeCost));
-  EXPECT_EQ(made(0.9, true, {}), made(0.9, true, kMergeCostOfStart));
-  EXPECT_LT(made(0.9, false, {}), made(0.9, true, {}));
+  EXPECT_EQ(made(false, {}), made(false, kMergeCost));
+  EXPECT_EQ(made(true, {}), made(true, kMergeCostOfStart));
+  EXPECT_LT(made(false, {}), made(true, {}));
 }
 
 TEST_F(SmallModel, ConvertKeepsTensorsAndTellsTheArchitecture) {

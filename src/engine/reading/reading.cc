@@ -58,9 +58,6 @@ Reading ReadFrom(const SplatFeatures& features, const ReadingModel& model) {
   Reading reading;
   reading.unit = features.unit;
   reading.strangeness = model.Strangeness(features.values);
-  static const size_t share =
-      static_cast<size_t>(std::ranges::find(FeatureNames(), "count.share_showing") - FeatureNames().begin());
-  reading.visible_share = features.values[share];
   reading.predictions = model.Predict(features.values);
   CombineWithPlaces(features, model, reading.predictions);
   const auto members = static_cast<double>(reading.predictions.size());

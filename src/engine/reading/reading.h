@@ -28,7 +28,6 @@ struct Reading {
   std::array<double, kProvenanceCount> provenance{};  // probability of each
   double strangeness = 0;    // ReadingModel::Strangeness; 2 % of splats like the training set exceed 1
   double unit = 0;           // unit of `predictions`, world units
-  double visible_share = 1;  // share of visible Gaussians (opacity of 10 % or more)
   std::vector<ReadingPrediction> predictions;
 
   // The assumed provenance: the most likely one. Having full width counts only if those provenances together have 89 %,

@@ -141,8 +141,8 @@ bool IsUpscaler(const fs::path& file) {
   return format != opened->metadata().end() && format->second == kUpscalerFormat;
 }
 
-// The costs by which networks choose among copies, unless a cost is given.
-std::string CostText() { return Cat(" cost ", kMergeCost, " or ", kMergeCostOfStandard); }
+// The cost by which networks choose among copies, unless a cost is given.
+std::string CostText() { return Cat(" cost ", kMergeCost); }
 
 Result<EvalMethod> Model(const fs::path& file) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string identity, Identity(file));

@@ -282,13 +282,12 @@ const EnhanceMethod* FindMethod(std::string_view name) {
 
 // Result of a single-step method for the splat at these pixel sizes and in this mode.
 Result<GaussianCloud> Treat(const EnhanceMethod& method, const GaussianCloud& cloud, const Buffer<float>& pixels,
-                            double multiple, double showing, const EnhanceOptions& options) {
+                            double multiple, const EnhanceOptions& options) {
   EnhanceInput input;
   input.cloud = cloud;
   input.pixel_sizes = pixels;
   for (float& size : input.pixel_sizes) size *= static_cast<float>(multiple);
   input.pixel_size = QuantileOf(input.pixel_sizes, 0.5);
-  input.visible_share = showing;
   input.filter_strength = DefaultFilterStrength(options.upscale, cloud.render_mode);
   StepReport report;
   return method.run(std::move(input), options, report);
@@ -392,12 +391,9 @@ Result<nlohmann::json> ReadingRows::Make(const ReadingTask& task) {
   const VisibleGaussians shown = FindVisibleGaussians(cloud);
   const auto features = FeaturesOf(cloud, shown);
   row["seconds_reading"] = Rounded(reading.Total());
-  double showing = 1;
   if (features.ok()) {
     row["unit"] = features->unit;
     row["features"] = RoundedAll(features->values);
-    const auto share = std::ranges::find(FeatureNames(), "count.share_showing");
-    showing = features->values[static_cast<size_t>(share - FeatureNames().begin())];
   } else {
     row["why_no_features"] = features.error().message;
   }
@@ -456,7 +452,7 @@ Result<nlohmann::json> ReadingRows::Make(const ReadingTask& task) {
       if (method == nullptr) continue;
       nlohmann::json& gains = row["gains"][NameOf(mode)][word] = nlohmann::json::array();
       for (const double multiple : kGainMultiples) {
-        ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud treated, Treat(*method, as, pixels, multiple, showing, options));
+        ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud treated, Treat(*method, as, pixels, multiple, options));
         ANCHORSPLAT_ASSIGN_OR_RETURN(const double psnr, measuring.Measure(std::move(treated)));
         gains.push_back(Rounded(psnr - raw));
       }

@@ -6,6 +6,7 @@
 
 #include "cli/verb.h"
 #include "cli/verb_tree.h"
+#include "request/choice.h"
 
 namespace anchorsplat {
 

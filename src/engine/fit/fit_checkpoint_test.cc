@@ -255,7 +255,7 @@ TEST_F(InterruptedFits, WhatIsNotDeliveredIsKept) {
   const auto lost = Fit(views_, Initial(), options_, control);
   ASSERT_FALSE(lost.ok());
   EXPECT_EQ(lost.error().code, ErrorCode::kIo);
-  EXPECT_THAT(lost.error().message, HasSubstr("out.ply: no room; the state after 60 steps is saved in "));
+  EXPECT_THAT(lost.error().message, HasSubstr("out.ply: no room; the state after step 60 is saved in "));
 
   GaussianCloud delivered;
   control.resume = true;

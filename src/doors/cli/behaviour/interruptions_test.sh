@@ -220,7 +220,7 @@ homeless() {
   wait $child
 }
 expect 3 "a fit that loses its folder" homeless
-says stderr "the state after 5,000 steps is saved in $work/state"
+says stderr "the state after step 5,000 is saved in $work/state"
 mkdir "$work/gone"
 expect 0 "it is finished at once" fit -o "$work/gone/splat.ply" --steps $some --checkpoint "$work/state" --resume
 expect 0 "its splat is there at last" "$program" info "$work/gone/splat.ply"

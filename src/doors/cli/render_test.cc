@@ -49,7 +49,8 @@ TEST_F(RenderVerb, OnePictureOfEveryCamera) {
   ExpectDone(Render("clear.png", {"--cameras", cameras, "--view", "003", "--transparent"}));
   EXPECT_EQ(ReadImage(folder_ / "clear.png")->channels, 4);
   ExpectRefused(Render("x.png", {"--cameras", cameras, "--view", "999"}), ErrorCode::kBadArgument, {"999"});
-  ExpectRefused(Render("x", {"--cameras", cameras, "--size", "100x50"}), ErrorCode::kBadArgument, {"another aspect ratio"});
+  ExpectRefused(Render("x", {"--cameras", cameras, "--size", "100x50"}), ErrorCode::kBadArgument,
+                {"another aspect ratio"});
   ExpectRefused(Render("x", {"--cameras", cameras, "--radius", "3"}), ErrorCode::kBadArgument, {"--radius"});
 }
 

@@ -95,7 +95,8 @@ const std::vector<MethodOption>& NetworkOptions() {
        WithCompact,
        "N"},
       {"merge-cost", InSettings<&ModelSettings::merge_cost>,
-       "With --copies auto: most error per merged Gaussian, in closer-view pixels x squared difference (default: 0.0003)",
+       "With --copies auto: most error per merged Gaussian, in closer-view pixels x squared difference (default: "
+       "0.0003)",
        kZeroOrMore,
        [](const MethodUse& use) {
          const std::string lack = WithCompact(use);

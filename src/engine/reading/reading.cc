@@ -47,8 +47,8 @@ void CombineWithPlaces(const SplatFeatures& whole, const ReadingModel& model,
     const double share = 1 / (1 + std::exp(2 * (log_spread - prediction.log_spread)));
     const double apart = pixel - prediction.log_pixel;
     prediction.log_pixel += share * apart;
-    prediction.log_spread = std::log(std::hypot(std::exp(std::min(prediction.log_spread, log_spread)),
-                                                std::sqrt(share * (1 - share)) * apart));
+    prediction.log_spread = std::log(
+        std::hypot(std::exp(std::min(prediction.log_spread, log_spread)), std::sqrt(share * (1 - share)) * apart));
   }
 }
 

@@ -26,8 +26,8 @@ struct Reading {
   double pixel = 0;          // training pixel at the subject, world units
   double low = 0, high = 0;  // 80 % interval of `pixel`, for kinds of splats in the training set
   std::array<double, kProvenanceCount> provenance{};  // probability of each
-  double strangeness = 0;    // ReadingModel::Strangeness; 2 % of splats like the training set exceed 1
-  double unit = 0;           // unit of `predictions`, world units
+  double strangeness = 0;  // ReadingModel::Strangeness; 2 % of splats like the training set exceed 1
+  double unit = 0;         // unit of `predictions`, world units
   std::vector<ReadingPrediction> predictions;
 
   // The assumed provenance: the most likely one. Having full width counts only if those provenances together have 89 %,

@@ -48,7 +48,8 @@ struct Weights {
   Result<ReadingModel> Load(const std::filesystem::path& path) const {
     std::vector<TensorEntry> entries;
     for (const auto& [name, tensor] : tensors) entries.push_back(MakeEntry(name, tensor.first, tensor.second));
-    const Status written = WriteSafetensors(path, entries, {{"features", names}, {"outputs", outputs}}, {.overwrite = true});
+    const Status written =
+        WriteSafetensors(path, entries, {{"features", names}, {"outputs", outputs}}, {.overwrite = true});
     if (!written.ok()) return written.error();
     ANCHORSPLAT_ASSIGN_OR_RETURN(const TensorFile file, TensorFile::Open(path));
     return ReadingModel::Load(file);

@@ -259,15 +259,16 @@ Status Score(const ReadingFlags& flags, const SharedFlags& shared) {
     std::cout << FormatTable(table) << "\n" << ConfusionTable(rows, deciders[d].second) << "\n";
   }
   std::cout << FormatTable(overall) << "\n";
-  std::cout
-      << "mean, worst, 2 % quantile: gain over the splat as it is, dB; lose: rows that lose more than " << kReadingLoss
-      << "\nheld: intervals that hold the true pixel; width: upper over lower end, geometric mean\n"
-         "known: untagged splats recognised\n"
-         "accused: untagged splats with lost width that are taken for widened or enhanced\n"
-         "s: seconds before the method begins, median\n"
-         "true: mean gain with the true pixel; best: of the best measured method\n"
-      << "interpolated gains are off by " << Fixed(error.median, 2) << " dB in the median and " << Fixed(error.most, 2)
-      << " dB at the 95th percentile, over " << WithThousands(error.rows) << " measured decisions\n";
+  std::cout << "mean, worst, 2 % quantile: gain over the splat as it is, dB; lose: rows that lose more than "
+            << kReadingLoss
+            << "\nheld: intervals that hold the true pixel; width: upper over lower end, geometric mean\n"
+               "known: untagged splats recognised\n"
+               "accused: untagged splats with lost width that are taken for widened or enhanced\n"
+               "s: seconds before the method begins, median\n"
+               "true: mean gain with the true pixel; best: of the best measured method\n"
+            << "interpolated gains are off by " << Fixed(error.median, 2) << " dB in the median and "
+            << Fixed(error.most, 2) << " dB at the 95th percentile, over " << WithThousands(error.rows)
+            << " measured decisions\n";
   return {};
 }
 
@@ -288,14 +289,13 @@ Status RunReading(const ReadingFlags& flags, Program& program) {
 }  // namespace
 
 void AddReadingBench(CLI::App& bench, Program& program) {
-  CLI::App& verb =
-      AddVerb(bench, program, "reading", "Measure the estimates from splats",
-              "anchorsplat bench reading --score data/reading.jsonl.gz");
+  CLI::App& verb = AddVerb(bench, program, "reading", "Measure the estimates from splats",
+                           "anchorsplat bench reading --score data/reading.jsonl.gz");
   const auto flags = std::make_shared<ReadingFlags>();
   verb.add_option("splats", flags->splats, "Splat files");
   verb.add_flag("--features", flags->features, "Print the model's input for these splats");
-  CLI::Option* const tasks = verb.add_option("--tasks", flags->tasks,
-                                             "Make rows of the table for these splats (JSON lines by scripts/reading-table.py)");
+  CLI::Option* const tasks = verb.add_option(
+      "--tasks", flags->tasks, "Make rows of the table for these splats (JSON lines by scripts/reading-table.py)");
   tasks->needs(verb.add_option("-o,--output", flags->output,
                                "Folder for a file per row; existing rows of unchanged splats are kept")
                    ->needs(tasks)
@@ -311,8 +311,7 @@ void AddReadingBench(CLI::App& bench, Program& program) {
       verb.add_option("--folds", flags->folds,
                       "Also score these models, each on the fold it has not seen (folder by scripts/train-reading.py)")
           ->needs(table);
-  verb.add_option("--losses-count", flags->loss_weight,
-                  "With --folds: weight of a lost decibel against a gained one")
+  verb.add_option("--losses-count", flags->loss_weight, "With --folds: weight of a lost decibel against a gained one")
       ->needs(folds)
       ->check(NotNegative())
       ->capture_default_str();

@@ -14,8 +14,8 @@
 
 namespace anchorsplat {
 
-// Weight of a lost decibel against a gained one, chosen so that at most about 2 % of splats lose 0.1 dB
-// (docs/reading.md).
+// How much more a lost decibel counts than a gained one (score: gain - kLossWeight x loss), chosen so that at most
+// about 2 % of splats lose 0.1 dB (docs/reading.md).
 inline constexpr double kLossWeight = 4;
 // Likewise of wrongly taking a splat for finished against the opposite.
 inline constexpr double kFinishedWeight = 8;

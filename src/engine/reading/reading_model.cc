@@ -98,7 +98,9 @@ Result<ReadingModel> ReadingModel::Load(const TensorFile& file) {
   }
   const auto outputs = file.metadata().find("outputs");
   if (outputs == file.metadata().end() || outputs->second != kOutputs) {
-    return Error{ErrorCode::kBadFile, Cat(file.name(), ": its outputs must be '", kOutputs, "'")};
+    return Error{
+        ErrorCode::kBadFile,
+        Cat(file.name(), ": its outputs are those of another version; train it again with scripts/train-reading.py")};
   }
   const auto inputs = static_cast<int64_t>(names.size());
   ANCHORSPLAT_ASSIGN_OR_RETURN(model.mean_, ReadAll(file, "mean", std::array{inputs}));

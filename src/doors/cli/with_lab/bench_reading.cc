@@ -276,7 +276,7 @@ Status RunReading(const ReadingFlags& flags, Program& program) {
   const int asked = (flags.features ? 1 : 0) + (flags.tasks.empty() ? 0 : 1) + (flags.table.empty() ? 0 : 1);
   if (asked != 1) {
     return Error{ErrorCode::kBadArgument,
-                 "pass --features (of splats), --tasks (rows of the table) or --score (a table)"};
+                 "pass exactly one of --features (of splats), --tasks (rows of the table) and --score (a table)"};
   }
   if (flags.features && flags.splats.empty()) return Error{ErrorCode::kBadArgument, "--features needs a splat"};
   if (!flags.features && !flags.splats.empty()) {
@@ -311,7 +311,7 @@ void AddReadingBench(CLI::App& bench, Program& program) {
       verb.add_option("--folds", flags->folds,
                       "Also score these models, each on the fold it has not seen (folder by scripts/train-reading.py)")
           ->needs(table);
-  verb.add_option("--losses-count", flags->loss_weight, "With --folds: weight of a lost decibel against a gained one")
+  verb.add_option("--losses-count", flags->loss_weight, "With --folds: extra weight of a lost decibel")
       ->needs(folds)
       ->check(NotNegative())
       ->capture_default_str();

@@ -97,8 +97,7 @@ TEST_F(ResidentRefinement, ALostDeviceCostsSteps) {
     const Refined refined = OnGpu(faulty);
     EXPECT_EQ(refined.report.steps, 15);
     EXPECT_NEAR(refined.report.after, expected, kAlike) << part;
-    EXPECT_THAT(messages.warnings(),
-                Contains(HasSubstr("because the GPU gave up: the device was lost (a test says so)")));
+    EXPECT_THAT(messages.warnings(), Contains(HasSubstr("as the GPU failed: the device was lost (a test says so)")));
   }
 }
 

@@ -198,8 +198,7 @@ TEST_F(ResidentFits, ALostDeviceCostsSteps) {
     const Fitted fitted = OnGpu(faulty, control);
     EXPECT_EQ(fitted.report.steps, 60);
     EXPECT_NEAR(fitted.report.train.psnr, expected, kAlike) << part;
-    EXPECT_THAT(messages.warnings(),
-                Contains(HasSubstr("because the GPU gave up: the device was lost (a test says so)")));
+    EXPECT_THAT(messages.warnings(), Contains(HasSubstr("as the GPU failed: the device was lost (a test says so)")));
     if (part > 0.5 && part < 0.9) {
       EXPECT_THAT(messages.warnings(), Contains("continuing from step 25, the last one copied to main memory"));
     }

@@ -58,9 +58,9 @@ Result<size_t> ChooseAdapter(const std::vector<GpuAdapter>& adapters, const Devi
     return adapter.unusable.empty() && adapter.type == GpuAdapter::Type::kCpu;
   };
   if (std::ranges::any_of(adapters, usable_software)) {
-    return Error{ErrorCode::kNotFound, "there are only software adapters here, and auto takes none (gpu does)"};
+    return Error{ErrorCode::kNotFound, "only software adapters were found: --device gpu uses them, auto does not"};
   }
-  return Error{ErrorCode::kNotFound, "none of the GPUs here can be used (anchorsplat doctor says why)"};
+  return Error{ErrorCode::kNotFound, "no GPU can be used (anchorsplat doctor says why)"};
 }
 
 }  // namespace anchorsplat

@@ -53,7 +53,7 @@ TEST(ChooseAdapter, AutoNeverTakesTheCpu) {
   EXPECT_EQ(Chosen({{Type::kCpu}, {Type::kIntegrated}}, Kind::kAuto), 1u);
   EXPECT_EQ(Chosen({{Type::kCpu}}, Kind::kAuto), std::nullopt);
   EXPECT_EQ(ChooseAdapter(Adapters({{Type::kCpu}}), {Kind::kAuto}).error().message,
-            "there are only software adapters here, and auto takes none (gpu does)");
+            "only software adapters were found: --device gpu uses them, auto does not");
 }
 
 TEST(ChooseAdapter, WhatCannotBeUsedIsNotTaken) {

@@ -31,7 +31,7 @@ void GiveUpGpu(const Error& reason) {
     state->given_up = reason.message;
     state->opened.reset();
   }
-  LogWarning(Cat("The work goes on on the CPU, because the GPU gave up: ", reason.message));
+  LogWarning(Cat("Continuing on the CPU, as the GPU failed: ", reason.message));
 }
 
 std::string WhyGpuWasGivenUp() {

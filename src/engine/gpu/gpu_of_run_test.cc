@@ -56,7 +56,7 @@ TEST(GpuOfRun, GivingUpIsSaidOnceAndEndsWithTheRun) {
     GiveUpGpu({ErrorCode::kIo, "the device was lost"});
     GiveUpGpu({ErrorCode::kIo, "the device was lost again"});
     EXPECT_EQ(messages.warnings(),
-              std::vector<std::string>{"The work goes on on the CPU, because the GPU gave up: the device was lost"});
+              std::vector<std::string>{"Continuing on the CPU, as the GPU failed: the device was lost"});
     EXPECT_EQ(WhyGpuWasGivenUp(), "the device was lost");
     EXPECT_EQ(GpuOfRun().value(), nullptr);
   }

@@ -71,7 +71,7 @@ std::string EmptyPictureReason(const CloudView& cloud, const Camera& camera, con
   add(depths.too_near, Cat("before the near plane (", near, ")"));
   add(depths.too_far, Cat("beyond the far plane (", options.far_plane, ")"));
   add(depths.faint, "less opaque than 1/255");
-  add(depths.unusable, Cat("drawn by nobody (", kWhyUnusable, ")"));
+  add(depths.unusable, Cat("not drawable (", kWhyUnusable, ")"));
   add(depths.in_range - depths.faint - depths.unusable,
       drawn.value_or(1) == 0 ? "in range but beside the picture" : "in range");
   return Cat("view ", Printable(camera.name), " shows ", drawn.value_or(1) == 0 ? "nothing" : "almost nothing",

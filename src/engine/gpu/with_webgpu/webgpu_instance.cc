@@ -124,8 +124,7 @@ WebGpuInstance::WebGpuInstance() {
     if (!search.named.empty()) {
       problem_ = Cat("ANCHORSPLAT_WEBGPU: ", problem_);
     } else if (candidates.size() == 1) {
-      problem_ =
-          "there is no WebGPU library: pip install wgpu==0.32.0 brings one, or ANCHORSPLAT_WEBGPU names its file";
+      problem_ = "no WebGPU library was found: run pip install wgpu==0.32.0, or set ANCHORSPLAT_WEBGPU to its file";
     }
     return;
   }

@@ -127,9 +127,12 @@ TEST(Features, BearWhatFilesContain) {
   // All at one place, and all flat.
   GaussianCloud point = Sphere(500);
   std::ranges::fill(point.means, 0.5f);
-  (void)FeaturesOf(point);
+  const auto at_one_place = FeaturesOf(point);
+  ASSERT_TRUE(at_one_place.ok()) << at_one_place.error().message;
   for (size_t i = 0; i < point.log_scales.size(); i += 3) point.log_scales[i] = -INFINITY;
-  (void)FeaturesOf(point);
+  const auto flat = FeaturesOf(point);
+  ASSERT_TRUE(flat.ok()) << flat.error().message;
+  EXPECT_EQ(flat->values.size(), FeatureNames().size());
 }
 
 }  // namespace

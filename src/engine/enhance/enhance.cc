@@ -254,6 +254,7 @@ Result<Enhanced> EnhanceFromOrigin(GaussianCloud cloud, const EnhanceOptions& op
   if (options.mode) input.cloud.render_mode = options.mode;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SizedMethods sized, FindSizedMethods(plan, options));
   if (options.clean) ANCHORSPLAT_RETURN_IF_ERROR(Clean(options, input.cloud, report));
+  const std::string planned = plan.Name();
   if (sized.any) {
     ANCHORSPLAT_RETURN_IF_ERROR(ChooseTreatment(options, plan, input, report));
   } else if (IsMarkedEnhanced(input.cloud)) {
@@ -269,7 +270,8 @@ Result<Enhanced> EnhanceFromOrigin(GaussianCloud cloud, const EnhanceOptions& op
   }
 
   LeaveIfAbandoned();
-  if (options.starting && (!sized.any || report.filter_strength > 0 || plan.method->invents(options))) {
+  if (options.starting && plan.Name() == planned &&
+      (!sized.any || report.filter_strength > 0 || plan.method->invents(options))) {
     options.starting();
   }
   const Stopwatch watch;

@@ -63,7 +63,9 @@ struct EnhanceOptions {
   std::optional<std::array<float, 3>> background;  // of the training views, for `clean` and refinement; unset: from the
                                                    // cameras, else from the splat's comment, else black
   uint64_t seed = 0;
-  std::function<void()> starting;  // called before the methods run, unless they leave the splat unchanged; may be null
+  // Called before the planned methods run, unless they leave the splat unchanged or the filter replaces them. May be
+  // null.
+  std::function<void()> starting;
 };
 
 // Whether the user set the option with this name (without dashes).

@@ -21,8 +21,7 @@ struct ForeignProgram {
 constexpr const char* kFromRealityCapture =
     "export the registration as COLMAP, or as Bundler (bundle.out and its picture list)";
 constexpr const char* kByNerfstudio = "convert it to a transforms.json with nerfstudio's ns-process-data";
-
-constexpr const char* kCamerasOf = "pass the transforms.json, the COLMAP model or the project folder";
+constexpr const char* kPassCameras = "pass the transforms.json, the COLMAP model or the project folder";
 
 const std::vector<ForeignProgram>& ForeignPrograms() {
   static const std::vector<ForeignProgram> programs = {
@@ -47,8 +46,8 @@ const std::vector<ForeignProgram>& ForeignPrograms() {
       {{".splat", ".ksplat", ".spz", ".sog"},
        {"ply\n", "ply\r", "glTF"},
        "a splat or a point cloud, not cameras",
-       kCamerasOf},
-      {{}, {"\x89PNG", "\xff\xd8\xff", "RIFF"}, "a picture, not cameras", kCamerasOf},
+       kPassCameras},
+      {{}, {"\x89PNG", "\xff\xd8\xff", "RIFF"}, "a picture, not cameras", kPassCameras},
       {{".abc", ".fbx", ".usd", ".usda", ".usdc", ".usdz", ".blend"},
        {},
        "a scene file of a 3D program",

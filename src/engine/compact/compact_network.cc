@@ -28,18 +28,6 @@ namespace {
 constexpr int64_t kRowsPerTask = 128;
 constexpr int64_t kMostRows = int64_t{1} << 31;
 
-void ApplyLinear(int64_t rows, const float* input, const PackedWeights& weights, float* out,
-                 Activation activation = Activation::kNone, const float* residual = nullptr) {
-  LinearCpu({.rows = rows,
-             .input = input,
-             .input_stride = weights.inputs(),
-             .weights = &weights,
-             .activation = activation,
-             .residual = residual,
-             .out = out,
-             .output_stride = weights.outputs()});
-}
-
 }  // namespace
 
 bool CompactNetwork::HasTrainingRange() const {
@@ -76,24 +64,24 @@ void CompactNetwork::FindStates(const CompactFeatures& features, const CompactBl
     const int64_t rows = end - begin;
     Buffer<float> nodes(static_cast<size_t>(rows * NodeFeatures(config_))), first(static_cast<size_t>(rows * h));
     features.Nodes(rows_of(begin, end), nodes.data());
-    ApplyLinear(rows, nodes.data(), embed_first_, first.data(), Activation::kGelu);
-    ApplyLinear(rows, first.data(), embed_second_, states.data() + begin * h);
+    LinearCpu(rows, nodes.data(), embed_first_, first.data(), Activation::kGelu);
+    LinearCpu(rows, first.data(), embed_second_, states.data() + begin * h);
     normalise(rows, embed_norm_, states.data() + begin * h);
   });
   for (size_t r = 0; r < rounds_.size(); ++r) {
     const Round& round = rounds_[r];
     // In each round only states that the block's own still depend on are updated.
     const int64_t listeners = block.reach[rounds_.size() - 1 - r], heard = block.reach[rounds_.size() - r];
-    ApplyLinear(heard, states.data(), round.other, others.data());
+    LinearCpu(heard, states.data(), round.other, others.data());
     ParallelFor(0, listeners, kRowsPerTask, [&](int64_t begin, int64_t end) {
       const int64_t rows = end - begin;
       float* own_states = states.data() + begin * h;
       Buffer<float> own(static_cast<size_t>(rows * h)),
           features_of_edges(static_cast<size_t>(rows * m * kEdgeFeatures)), edges(static_cast<size_t>(rows * m * h)),
           messages(edges.size()), pooled(static_cast<size_t>(rows * 3 * h));
-      ApplyLinear(rows, own_states, round.own, own.data());
+      LinearCpu(rows, own_states, round.own, own.data());
       features.Edges(rows_of(begin, end), features_of_edges.data());
-      ApplyLinear(rows * m, features_of_edges.data(), round.edge, edges.data());
+      LinearCpu(rows * m, features_of_edges.data(), round.edge, edges.data());
       EdgeSumGeluCpu({.points = rows,
                       .neighbours = m,
                       .channels = h,
@@ -101,7 +89,7 @@ void CompactNetwork::FindStates(const CompactFeatures& features, const CompactBl
                       .other = others.data(),
                       .index = block.index.data() + begin * m,
                       .edges = edges.data()});
-      ApplyLinear(rows * m, edges.data(), round.message, messages.data());
+      LinearCpu(rows * m, edges.data(), round.message, messages.data());
       for (int64_t i = 0; i < rows; ++i) std::copy_n(own_states + i * h, h, pooled.data() + i * 3 * h);
       EdgePoolCpu({.points = rows,
                    .neighbours = m,
@@ -109,9 +97,9 @@ void CompactNetwork::FindStates(const CompactFeatures& features, const CompactBl
                    .edges = messages.data(),
                    .out_stride = 3 * h,
                    .out = pooled.data() + h});
-      ApplyLinear(rows, pooled.data(), round.update_first, own.data(), Activation::kGelu);
+      LinearCpu(rows, pooled.data(), round.update_first, own.data(), Activation::kGelu);
       // In place: messages were computed from the old states before.
-      ApplyLinear(rows, own.data(), round.update_second, own_states, Activation::kNone, own_states);
+      LinearCpu(rows, own.data(), round.update_second, own_states, Activation::kNone, own_states);
       normalise(rows, round.norm, own_states);
     });
   }
@@ -128,9 +116,9 @@ void CompactNetwork::Head(const CompactFeatures& features, const CompactBlock& b
     std::copy_n(states.own.data() + (begin + i) * h, h, input.data() + i * width);
     std::copy_n(nodes.data() + i * told, told, input.data() + i * width + h);
   }
-  ApplyLinear(rows, input.data(), head_first_, first.data(), Activation::kGelu);
-  ApplyLinear(rows, first.data(), head_second_, second.data(), Activation::kGelu);
-  ApplyLinear(rows, second.data(), out_, out);
+  LinearCpu(rows, input.data(), head_first_, first.data(), Activation::kGelu);
+  LinearCpu(rows, first.data(), head_second_, second.data(), Activation::kGelu);
+  LinearCpu(rows, second.data(), out_, out);
 }
 
 void CompactNetwork::Outputs(const CompactFeatures& features, const CompactGraph& graph, float* out) const {

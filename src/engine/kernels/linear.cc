@@ -160,5 +160,17 @@ void LinearCpu(const LinearParams& p) {
   ParallelFor(0, p.rows, rows_per_task, [&](int64_t begin, int64_t end) { rows(p, begin, end); });
 }
 
+void LinearCpu(int64_t rows, const float* input, const PackedWeights& weights, float* out, Activation activation,
+               const float* residual) {
+  LinearCpu({.rows = rows,
+             .input = input,
+             .input_stride = weights.inputs(),
+             .weights = &weights,
+             .activation = activation,
+             .residual = residual,
+             .out = out,
+             .output_stride = weights.outputs()});
+}
+
 }  // namespace anchorsplat
 #endif

@@ -23,5 +23,8 @@ struct LinearParams {
 };
 // The same bits for any number of threads; the last bit may differ between SIMD widths.
 void LinearCpu(const LinearParams& p);
+// The same for rows without gaps.
+void LinearCpu(int64_t rows, const float* input, const PackedWeights& weights, float* out,
+               Activation activation = Activation::kNone, const float* residual = nullptr);
 
 }  // namespace anchorsplat

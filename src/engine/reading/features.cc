@@ -501,25 +501,27 @@ Result<SplatFeatures> Measure(const CloudView& whole, const VisibleGaussians& vi
   return features;
 }
 
+// Of the places that can be measured.
 std::vector<SplatFeatures> FeaturesOfPlaces(const CloudView& whole, const VisibleGaussians& visible) {
   const SplatPlaces places(visible.cloud);
-  std::vector<Result<SplatFeatures>> found(static_cast<size_t>(places.count()), Error{ErrorCode::kBadArgument, ""});
+  std::vector<std::optional<SplatFeatures>> found(static_cast<size_t>(places.count()));
   ParallelFor(0, places.count(), 1, [&](int64_t place, int64_t) {
-    LeaveIfAbandoned();
     std::vector<int64_t> rows = places.rows(place);
     for (int64_t& row : rows) row = visible.rows[static_cast<size_t>(row)];
-    const auto part = Subset(whole, rows);
-    if (part.ok()) found[static_cast<size_t>(place)] = FeaturesOfPlace(*part);
+    auto features = FeaturesOfPlace(whole, rows);
+    if (features.ok()) found[static_cast<size_t>(place)] = *std::move(features);
   });
-  std::erase_if(found, [](const auto& features) { return !features.ok(); });
   std::vector<SplatFeatures> out;
-  for (auto& features : found) out.push_back(*std::move(features));
+  for (auto& features : found) {
+    if (features) out.push_back(*std::move(features));
+  }
   return out;
 }
 
 }  // namespace
 
-Result<SplatFeatures> FeaturesOfPlace(const CloudView& place) {
+Result<SplatFeatures> FeaturesOfPlace(const CloudView& whole, std::span<const int64_t> rows) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud place, Subset(whole, rows));
   return Measure(place, FindVisibleGaussians(place), {}, /*with_pictures=*/false);
 }
 

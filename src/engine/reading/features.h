@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -43,7 +45,7 @@ const std::vector<std::string>& FeatureNames();
 Result<SplatFeatures> FeaturesOf(const CloudView& whole, const VisibleGaussians& visible);
 Result<SplatFeatures> FeaturesOf(const CloudView& whole);
 
-// Features of the Gaussians of one place, without pictures: outline and detail are NaN.
-Result<SplatFeatures> FeaturesOfPlace(const CloudView& place);
+// Features of one place: these rows alone, without pictures, so outline and detail are NaN. Errors: as FeaturesOf.
+Result<SplatFeatures> FeaturesOfPlace(const CloudView& whole, std::span<const int64_t> rows);
 
 }  // namespace anchorsplat

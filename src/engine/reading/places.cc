@@ -63,9 +63,7 @@ void FillBoxes(const CloudView& cloud, std::span<const int64_t> visible, std::sp
 // ln of the predicted pixel of a place; NaN if it cannot be read.
 double LogPixelOf(const CloudView& cloud, std::span<const int64_t> rows, const ReadingModel& model) {
   constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-  const auto part = Subset(cloud, rows);
-  if (!part.ok()) return kUnknown;
-  const auto features = FeaturesOfPlace(*part);
+  const auto features = FeaturesOfPlace(cloud, rows);
   if (!features.ok()) return kUnknown;
   const std::vector<ReadingPrediction> predictions = model.Predict(features->values);
   double sum = std::log(features->unit);

@@ -340,8 +340,7 @@ Result<nlohmann::json> PlacesOf(const GaussianCloud& cloud, const Buffer<float>&
     const std::vector<int64_t>& rows = places.rows((2 * k + 1) * all / (2 * wanted));
     Buffer<float> own;
     for (const int64_t i : rows) own.push_back(pixels[static_cast<size_t>(i)]);
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud part, Subset(cloud, rows));
-    const auto features = FeaturesOfPlace(part);
+    const auto features = FeaturesOfPlace(cloud, rows);
     if (!features.ok()) continue;
     out.push_back({{"unit", features->unit},
                    {"pixel", QuantileOf(std::move(own), 0.5)},

@@ -122,8 +122,9 @@ Result<std::vector<ReadingRow>> ReadReadingTable(const fs::path& path) {
     if (line > 1) {
       const ReadingRow& row = rows.emplace_back(RowFrom(object));
       const size_t values = row.features.values.size(), named = FeatureNames().size();
-      const bool agree = std::ranges::all_of(row.features.places,
-                                             [&](const SplatFeatures& place) { return place.values.size() == named; });
+      const bool agree = std::ranges::all_of(row.features.places, [&](const SplatFeatures& place) {
+        return place.unit > 0 && place.values.size() == named;
+      });
       return agree && (values == 0 || values == named) ? ""
                                                        : "has another number of features than the first line names";
     }

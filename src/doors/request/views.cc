@@ -149,10 +149,11 @@ Result<CameraSet> MakeViews(const ViewFlags& flags, const CloudView& cloud, cons
     ANCHORSPLAT_ASSIGN_OR_RETURN(cameras, OrbitViews(flags, cloud, cameras));
     return KeepView(std::move(cameras), flags.view);
   }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(cameras, KeepView(std::move(cameras), flags.view));
   if (!flags.size.empty()) {
     ANCHORSPLAT_RETURN_IF_ERROR(Resize(cameras, flags.size));
   }
-  return KeepView(std::move(cameras), flags.view);
+  return cameras;
 }
 
 Result<RenderOptions> MakeRenderOptions(const ViewFlags& flags, const CloudView& cloud, const CameraSet& cameras) {

@@ -49,26 +49,37 @@ struct KnownPixels {
   std::optional<double> pixel;  // their median
 };
 
-Result<CameraPixelSizes> PixelsOfCameras(const EnhanceOptions& options, const EnhanceInput& input,
+// Takes the cameras for those of larger pictures than the splat was fitted to, if its reading makes that likelier.
+void ShrinkPictures(const CameraSet& given, const Reading& reading, CameraPixelSizes& sizes, EnhanceInput& input,
+                    EnhanceReport& report) {
+  const int assumed = WidestOf(*input.cameras), widest = WidestOf(given);
+  std::vector<double> shrinks;
+  if (assumed < widest) shrinks.push_back(1);
+  for (const double shrink : kPictureShrinks) shrinks.push_back(shrink * widest / assumed);
+  const double shrink = LikeliestShrink(reading, double{sizes.median}, shrinks);
+  if (shrink == 1) return;
+  for (float& size : sizes.sizes) size = static_cast<float>(size / shrink);
+  sizes.median = static_cast<float>(sizes.median / shrink);
+  for (Camera& camera : input.cameras->cameras) camera.intrinsics = Scaled(camera.intrinsics, shrink);
+  report.train_width.reset();
+  if (const int width = WidestOf(*input.cameras); width < widest) report.train_width = width;
+}
+
+// `reading`: null if the cameras' own size is to be believed.
+Result<CameraPixelSizes> PixelsOfCameras(const EnhanceOptions& options, const Reading* reading, EnhanceInput& input,
                                          EnhanceReport& report) {
-  std::optional<int> train_width = options.train_width;
-  if (train_width) {
-    int widest = 0;
-    for (const Camera& camera : options.cameras->cameras) widest = std::max(widest, camera.intrinsics.width);
-    if (*train_width > widest) {
-      return Error{ErrorCode::kBadArgument,
-                   Cat("--train-width ", *train_width, " has no effect: the views of --cameras are only ", widest,
-                       " pixels wide")};
-    }
-  } else {
-    train_width = AssumedTrainWidth(*options.cameras);
-    if (train_width) {
-      LogWarning(Cat("assuming that training shrank the views to ", *train_width,
-                     " pixels, as INRIA's trainer does. If it did not, pass their width with --train-width"));
-    }
+  const CameraSet& given = *options.cameras;
+  const int widest = WidestOf(given);
+  if (options.train_width && *options.train_width > widest) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--train-width ", *options.train_width, " has no effect: the views of --cameras are only ", widest,
+                     " pixels wide")};
   }
+  report.train_width = options.train_width ? options.train_width : AssumedTrainWidth(given);
+  if (report.train_width == widest) report.train_width.reset();
+  input.cameras = AtTrainWidth(given, report.train_width.value_or(widest));
   ANCHORSPLAT_ASSIGN_OR_RETURN(CameraPixelSizes sizes,
-                               PixelSizesFromCameras(input.cloud, *options.cameras, train_width, options.camera_rule));
+                               PixelSizesFromCameras(input.cloud, *input.cameras, options.camera_rule));
   if (sizes.unseen == input.cloud.size()) {
     return Error{ErrorCode::kBadArgument,
                  "no camera sees any of the Gaussians: pass the cameras of this splat, in its unit and axes"};
@@ -81,7 +92,16 @@ Result<CameraPixelSizes> PixelsOfCameras(const EnhanceOptions& options, const En
   }
   report.camera_rule = sizes.rule == CameraPixelRule::kMedian ? "median" : "smallest";
   if (!sizes.why.empty()) LogInfo(Cat("using --camera-rule ", report.camera_rule, ", as ", sizes.why));
-  report.train_width = train_width;
+  if (options.train_width) return sizes;
+  const std::optional<int> assumed = report.train_width;
+  if (reading != nullptr) ShrinkPictures(given, *reading, sizes, input, report);
+  if (report.train_width && report.train_width != assumed) {
+    LogWarning(Cat("the splat looks fitted to pictures ", *report.train_width, " pixels wide, not ", widest,
+                   ". If it was not, pass their width with --train-width"));
+  } else if (report.train_width) {
+    LogWarning(Cat("assuming that training shrank the views to ", *report.train_width,
+                   " pixels, as INRIA's trainer does. If it did not, pass their width with --train-width"));
+  }
   return sizes;
 }
 
@@ -93,9 +113,10 @@ bool AreFarOff(double median, const Result<Reading>& reading) {
 }
 
 Result<KnownPixels> PixelsFrom(const EnhanceOptions& options, bool said, const Result<Reading>& reading,
-                               const EnhanceInput& input, EnhanceReport& report) {
+                               EnhanceInput& input, EnhanceReport& report) {
   KnownPixels known;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraPixelSizes sizes, PixelsOfCameras(options, input, report));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraPixelSizes sizes,
+                               PixelsOfCameras(options, said || !reading.ok() ? nullptr : &*reading, input, report));
   if (!said && AreFarOff(double{sizes.median}, reading)) {
     LogWarning(Cat("ignoring the cameras: their training pixel, ", sizes.median,
                    ", is far larger than the splat's own, ", reading->pixel,
@@ -110,7 +131,7 @@ Result<KnownPixels> PixelsFrom(const EnhanceOptions& options, bool said, const R
 
 // Pixel sizes known before the reading.
 Result<KnownPixels> FindKnownPixels(const EnhanceOptions& options, bool with_pictures, bool said,
-                                    const Result<Reading>& reading, const EnhanceInput& input, EnhanceReport& report) {
+                                    const Result<Reading>& reading, EnhanceInput& input, EnhanceReport& report) {
   if (options.cameras) {
     report.pixel_size_source = PixelSizeSource::kCameras;
     return PixelsFrom(options, said, reading, input, report);
@@ -127,8 +148,11 @@ Result<KnownPixels> FindKnownPixels(const EnhanceOptions& options, bool with_pic
     EnhanceOptions with_cameras = options;
     with_cameras.cameras.emplace().cameras = std::move(project.train);
     with_cameras.camera_rule = CameraPixelRule::kMedian;
+    with_cameras.train_width = WidestOf(*with_cameras.cameras);  // the training's own pictures
     report.pixel_size_source = PixelSizeSource::kPictures;
-    return PixelsFrom(with_cameras, said, reading, input, report);
+    auto known = PixelsFrom(with_cameras, said, reading, input, report);
+    input.cameras.reset();
+    return known;
   }
   report.pixel_size_source = PixelSizeSource::kRead;
   return KnownPixels{};
@@ -278,13 +302,15 @@ std::string_view LostNothing(const GaussianCloud& cloud) {
   return "";
 }
 
-// Cameras of larger pictures than the splat was fitted to cost most of the gain.
-void SayIfUnlike(const Reading& reading, double pixel, PixelSizeSource source) {
+// A wrong pixel size costs most of the gain. Of a width that was not given, a warning was already printed.
+void SayIfUnlike(const EnhanceOptions& options, const EnhanceReport& report) {
+  const Reading& reading = *report.reading;
+  const double pixel = report.pixel_size;
   if (reading.strangeness > 1 || (pixel >= reading.low && pixel <= reading.high)) return;
-  const bool given = source == PixelSizeSource::kGiven;
+  if (report.train_width && !options.train_width) return;
+  const bool given = report.pixel_size_source == PixelSizeSource::kGiven;
   LogInfo(Cat(given ? "--pixel-size " : "the cameras' pixel size, ", pixel, given ? "" : ",",
-              " is outside the splat's own estimate (", reading.low, " to ", reading.high, ")",
-              given || pixel > reading.high ? "" : ". If it was fitted to smaller pictures, pass their --train-width"));
+              " is outside the splat's own estimate (", reading.low, " to ", reading.high, ")"));
 }
 
 }  // namespace
@@ -368,7 +394,7 @@ Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceI
     }
   }
   if (closer && !none && known.pixel && reading.ok() && lost_nothing.empty() && treatment.pixel == *known.pixel) {
-    SayIfUnlike(*reading, *known.pixel, report.pixel_size_source);
+    SayIfUnlike(options, report);
   }
   if (!none && !known.pixel && !part_alone && !options.filter_strength) {
     ReadParts(plan, request, treatment, model, input, report);

@@ -121,7 +121,7 @@ struct EnhanceReport {
   std::optional<Reading> reading;    // of the splat or its region; unset if too little is visible
   std::vector<PartTreatment> parts;  // separate components, each read by itself; empty if there is one
   std::string camera_rule;           // "smallest" or "median" if cameras were used
-  std::optional<int> train_width;    // pixels, given or assumed; unset if the cameras' own size was used
+  std::optional<int> train_width;    // pixels, given, assumed or read off the splat; unset: the cameras' own
   std::vector<StepReport> steps;     // in order; empty if the splat was left alone
   bool interrupted = false;          // whether a step was interrupted
   double seconds = 0;                // of the methods
@@ -134,8 +134,9 @@ bool IsInvented(const EnhanceReport& report);
 // The input of one method. Non-finite rows are gone; pixel sizes are known if the method needs them.
 struct EnhanceInput {
   GaussianCloud cloud;
-  Buffer<float> pixel_sizes;  // p_LR, world units, one for all or one per Gaussian
-  double pixel_size = 0;      // their median
+  Buffer<float> pixel_sizes;         // p_LR, world units, one for all or one per Gaussian
+  double pixel_size = 0;             // their median
+  std::optional<CameraSet> cameras;  // training cameras at the size used in training, if they were given
   double filter_strength = 0;
   std::vector<char> by_network;   // [N] whether to use the network for each Gaussian; empty: for all
   bool partly_enhanced = false;   // another part is marked as enhanced, so only Gaussians inside count for readings

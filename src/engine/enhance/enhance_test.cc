@@ -186,11 +186,46 @@ TEST_F(EnhanceTest, WarnsWhenCamerasAreNotThoseOfTheSplat) {
   options.mode = RenderMode::kClassic;
   EXPECT_GT(Enhance(cloud, options)->report.pixel_size, 0.04);
   options.mode.reset();
-  // Smaller ones blur nothing.
-  options.cameras = CamerasForPixel(0.001);
-  const auto small = Enhance(cloud, options);
-  EXPECT_EQ(small->report.pixel_size_source, PixelSizeSource::kCameras);
-  EXPECT_LT(small->report.pixel_size, 0.004);
+}
+
+TEST_F(EnhanceTest, FindsTheWidthInTrainingOfLargerPictures) {
+  const GaussianCloud cloud = ReadCloud(SourceDirForTest() / "examples/biplane/input.ply").value();
+  constexpr double kTrue = 1.7 / 309.02;
+  EnhanceOptions options;
+  options.cameras = CamerasForPixel(kTrue);
+  const auto exact = Enhance(cloud, options);
+  ASSERT_TRUE(exact.ok());
+  EXPECT_FALSE(exact->report.train_width);
+  EXPECT_FALSE(log_->Says("fitted to pictures")) << log_->text();
+  const int width = options.cameras->cameras[0].intrinsics.width;
+  for (Camera& camera : options.cameras->cameras) camera.intrinsics = Scaled(camera.intrinsics, 4);
+  const auto larger = Enhance(cloud, options);
+  ASSERT_TRUE(larger.ok());
+  EXPECT_EQ(larger->report.train_width, width);
+  EXPECT_NEAR(larger->report.pixel_size, exact->report.pixel_size, 1e-6);
+  EXPECT_TRUE(log_->Says(Cat("fitted to pictures ", width, " pixels wide, not ", 4 * width))) << log_->text();
+  // Whoever passes a width, or the mode, is believed.
+  options.train_width = 4 * width;
+  EXPECT_NEAR(Enhance(cloud, options)->report.pixel_size, exact->report.pixel_size / 4, 1e-6);
+  options.train_width.reset();
+  options.mode = RenderMode::kClassic;
+  EXPECT_NEAR(Enhance(cloud, options)->report.pixel_size, exact->report.pixel_size / 4, 1e-6);
+}
+
+// Refinement renders what the splat showed at the size used in training, not at the cameras' larger one.
+TEST_F(EnhanceTest, RefinesAtTheWidthInTraining) {
+  EnhanceOptions options;
+  options.method = "refine";
+  options.mode = RenderMode::kClassic;
+  options.refine.steps = 5;
+  options.cameras = CamerasForPixel(0.01);
+  const auto exact = Enhance(Ball(0.01), options);
+  ASSERT_TRUE(exact.ok()) << exact.error().message;
+  options.train_width = options.cameras->cameras[0].intrinsics.width;
+  for (Camera& camera : options.cameras->cameras) camera.intrinsics = Scaled(camera.intrinsics, 2);
+  const auto larger = Enhance(Ball(0.01), options);
+  ASSERT_TRUE(larger.ok()) << larger.error().message;
+  EXPECT_EQ(larger->cloud.log_scales, exact->cloud.log_scales);
 }
 
 TEST_F(EnhanceTest, SaysWhichTrainingWidthItAssumes) {

@@ -27,11 +27,11 @@ struct View {
   float t[3];
   float center[3];
   float x0, x1, y0, y1;  // x/z and y/z at the image borders
-  float focal;           // sqrt(fx·fy) at the training width
+  float focal;           // sqrt(fx·fy)
   float near;            // z of the near plane
 };
 
-View MakeView(const Camera& camera, const RenderOptions& shown, std::optional<int> train_width) {
+View MakeView(const Camera& camera, const RenderOptions& shown) {
   View view{};
   const Pinhole& k = camera.intrinsics;
   std::transform(camera.world_to_camera.rotation.begin(), camera.world_to_camera.rotation.end(), view.r,
@@ -44,8 +44,7 @@ View MakeView(const Camera& camera, const RenderOptions& shown, std::optional<in
   view.x1 = static_cast<float>((k.width - k.cx) / k.fx);
   view.y0 = static_cast<float>(-k.cy / k.fy);
   view.y1 = static_cast<float>((k.height - k.cy) / k.fy);
-  const double shrink = train_width && *train_width < k.width ? static_cast<double>(*train_width) / k.width : 1.0;
-  view.focal = static_cast<float>(std::sqrt(k.fx * k.fy) * shrink);
+  view.focal = static_cast<float>(std::sqrt(k.fx * k.fy));
   view.near = NearPlane(shown, camera);
   return view;
 }
@@ -53,14 +52,11 @@ View MakeView(const Camera& camera, const RenderOptions& shown, std::optional<in
 }  // namespace
 
 Result<CameraPixelSizes> PixelSizesFromCameras(const GaussianCloud& cloud, const CameraSet& cameras,
-                                               std::optional<int> train_width, CameraPixelRule rule) {
+                                               CameraPixelRule rule) {
   if (cameras.cameras.empty()) return Error{ErrorCode::kBadArgument, "no cameras to take the pixel size from"};
-  if (train_width && *train_width < 1) {
-    return Error{ErrorCode::kBadArgument, Cat("training width ", *train_width, " is not a number of pixels")};
-  }
   std::vector<View> views;
   const RenderOptions shown = DisplayOptions(cloud);
-  for (const Camera& camera : cameras.cameras) views.push_back(MakeView(camera, shown, train_width));
+  for (const Camera& camera : cameras.cameras) views.push_back(MakeView(camera, shown));
 
   CameraPixelSizes out;
   if (rule == CameraPixelRule::kAuto) {
@@ -112,11 +108,23 @@ Result<CameraPixelSizes> PixelSizesFromCameras(const GaussianCloud& cloud, const
   return out;
 }
 
+CameraSet AtTrainWidth(CameraSet cameras, int train_width) {
+  for (Camera& camera : cameras.cameras) {
+    Pinhole& k = camera.intrinsics;
+    if (k.width > train_width) k = Scaled(k, static_cast<double>(train_width) / k.width);
+  }
+  return cameras;
+}
+
+int WidestOf(const CameraSet& cameras) {
+  int widest = 0;
+  for (const Camera& camera : cameras.cameras) widest = std::max(widest, camera.intrinsics.width);
+  return widest;
+}
+
 std::optional<int> AssumedTrainWidth(const CameraSet& cameras) {
   if (cameras.source != CameraSource::kInria && cameras.source != CameraSource::kColmap) return std::nullopt;
-  const bool wider = std::any_of(cameras.cameras.begin(), cameras.cameras.end(),
-                                 [](const Camera& c) { return c.intrinsics.width > kInriaTrainWidth; });
-  return wider ? std::optional(kInriaTrainWidth) : std::nullopt;
+  return WidestOf(cameras) > kInriaTrainWidth ? std::optional(kInriaTrainWidth) : std::nullopt;
 }
 
 }  // namespace anchorsplat

@@ -19,9 +19,8 @@ enum class CameraPixelRule { kAuto, kSmallest, kMedian };
 
 // Pixel sizes from training cameras, one per Gaussian: smallest or median depth / sqrt(fx·fy) over the views whose
 // image contains its mean in front of the near plane. Gaussians in no view get the smallest distance / focal over all
-// cameras; non-finite means get the median. `train_width`: pixel width at which the views were trained; it scales down
-// the focal length of wider cameras.
-// Errors (kBadArgument): no cameras; train_width < 1.
+// cameras; non-finite means get the median. The cameras have the size that was used in training (AtTrainWidth).
+// kBadArgument: no cameras.
 struct CameraPixelSizes {
   Buffer<float> sizes;                                // [N] world units
   float median = 0;                                   // of `sizes`
@@ -30,8 +29,11 @@ struct CameraPixelSizes {
   std::string why;                                    // reason for that rule; empty if it was given
 };
 Result<CameraPixelSizes> PixelSizesFromCameras(const GaussianCloud& cloud, const CameraSet& cameras,
-                                               std::optional<int> train_width,
                                                CameraPixelRule rule = CameraPixelRule::kAuto);
+
+// Cameras of views at the size used in training: those wider than `train_width` pixels (at least 1) become that wide.
+CameraSet AtTrainWidth(CameraSet cameras, int train_width);
+int WidestOf(const CameraSet& cameras);  // pixels; 0 if there are none
 
 // Training width to assume if the user gives none. INRIA's trainer and its successors reduce wider images to 1600
 // pixels, but their cameras.json and COLMAP models keep the original size. Unset for narrower cameras and for

@@ -35,7 +35,7 @@ TEST(PixelSizesFromCameras, SmallestOverTheViewsThatSeeIt) {
   const GaussianCloud cloud = CloudAt({{0, 0, 4}, {9, 0, 4}, {0, 0, -20}, {0, 0, 1}});
   CameraSet cameras;
   cameras.cameras = {CameraAt(0), CameraAt(-6)};
-  const auto sizes = PixelSizesFromCameras(cloud, cameras, std::nullopt);
+  const auto sizes = PixelSizesFromCameras(cloud, cameras);
   ASSERT_TRUE(sizes.ok());
   EXPECT_FLOAT_EQ(sizes->sizes[0], 4.0f / 50);   // both see it, the near one counts
   EXPECT_FLOAT_EQ(sizes->sizes[1], 10.0f / 50);  // outside the near one's image
@@ -49,7 +49,7 @@ TEST(PixelSizesFromCameras, MedianOverTheViewsThatSeeIt) {
   const GaussianCloud cloud = CloudAt({{0, 0, 4}, {9, 0, 4}, {0, 0, -20}});
   CameraSet cameras;
   cameras.cameras = {CameraAt(0), CameraAt(-6), CameraAt(-10)};
-  const auto sizes = PixelSizesFromCameras(cloud, cameras, std::nullopt, CameraPixelRule::kMedian);
+  const auto sizes = PixelSizesFromCameras(cloud, cameras, CameraPixelRule::kMedian);
   ASSERT_TRUE(sizes.ok());
   EXPECT_FLOAT_EQ(sizes->sizes[0], 10.0f / 50);  // of 4, 10 and 14
   EXPECT_FLOAT_EQ(sizes->sizes[1], 12.0f / 50);  // of 10 and 14
@@ -61,7 +61,7 @@ TEST(PixelSizesFromCameras, FollowTheUnitOfTheScene) {
     const GaussianCloud cloud = CloudAt({{0, 0, 4 * unit}, {unit, 0, 5 * unit}, {0, unit, 6 * unit}});
     CameraSet cameras;
     cameras.cameras = {CameraAt(0)};
-    const auto sizes = PixelSizesFromCameras(cloud, cameras, std::nullopt);
+    const auto sizes = PixelSizesFromCameras(cloud, cameras);
     ASSERT_TRUE(sizes.ok());
     EXPECT_EQ(sizes->unseen, 0) << unit;
     EXPECT_FLOAT_EQ(sizes->sizes[0], unit * 4 / 50);
@@ -72,11 +72,10 @@ TEST(PixelSizesFromCameras, TrainWidthOnlyShrinks) {
   const GaussianCloud cloud = CloudAt({{0, 0, 5}});
   CameraSet cameras;
   cameras.cameras = {CameraAt(0)};
-  EXPECT_FLOAT_EQ(PixelSizesFromCameras(cloud, cameras, 25)->sizes[0], 0.4f);
-  EXPECT_FLOAT_EQ(PixelSizesFromCameras(cloud, cameras, 100)->sizes[0], 0.1f);
-  EXPECT_FLOAT_EQ(PixelSizesFromCameras(cloud, cameras, 1600)->sizes[0], 0.1f);
-  EXPECT_FALSE(PixelSizesFromCameras(cloud, cameras, 0).ok());
-  EXPECT_FALSE(PixelSizesFromCameras(cloud, CameraSet{}, std::nullopt).ok());
+  EXPECT_FLOAT_EQ(PixelSizesFromCameras(cloud, AtTrainWidth(cameras, 25))->sizes[0], 0.4f);
+  EXPECT_FLOAT_EQ(PixelSizesFromCameras(cloud, AtTrainWidth(cameras, 100))->sizes[0], 0.1f);
+  EXPECT_FLOAT_EQ(PixelSizesFromCameras(cloud, AtTrainWidth(cameras, 1600))->sizes[0], 0.1f);
+  EXPECT_FALSE(PixelSizesFromCameras(cloud, CameraSet{}).ok());
 }
 
 TEST(PixelSizesFromCameras, BrokenMeansGetTheMedian) {
@@ -85,7 +84,7 @@ TEST(PixelSizesFromCameras, BrokenMeansGetTheMedian) {
       CloudAt({{nan, 0, 5}, {0, 0, 5}, {0, 0, 5}, {0, std::numeric_limits<float>::infinity(), 0}});
   CameraSet cameras;
   cameras.cameras = {CameraAt(0)};
-  const auto sizes = PixelSizesFromCameras(cloud, cameras, std::nullopt);
+  const auto sizes = PixelSizesFromCameras(cloud, cameras);
   ASSERT_TRUE(sizes.ok());
   for (const float size : sizes->sizes) EXPECT_FLOAT_EQ(size, 0.1f);
 }

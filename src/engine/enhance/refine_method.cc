@@ -45,7 +45,7 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
   RefineInput refine;
   refine.upscale = options.upscale;
   refine.pixel_size = input.pixel_size;
-  refine.cameras = options.cameras;
+  refine.cameras = std::move(input.cameras);
   refine.seed = options.seed;
   refine.start_has_detail = input.start_has_detail;
   refine.start = std::move(input.start);

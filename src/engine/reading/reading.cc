@@ -21,6 +21,24 @@ Provenance Reading::likeliest() const {
   return static_cast<Provenance>(best);
 }
 
+double LikeliestShrink(const Reading& reading, double pixel, std::span<const double> shrinks) {
+  double best = shrinks[0], most = 0;
+  for (size_t k = 0; k < shrinks.size(); ++k) {
+    const double log_size = std::log(pixel / shrinks[k] / reading.unit);
+    double density = 0;  // of the members' Laplace distributions
+    for (const ReadingPrediction& prediction : reading.predictions) {
+      density += std::exp(-std::abs(log_size - prediction.log_pixel) / std::exp(prediction.log_spread) -
+                          prediction.log_spread);
+    }
+    density *= k == 0 ? kAsGiven : (1 - kAsGiven) / static_cast<double>(shrinks.size() - 1);
+    if (density > most) {
+      most = density;
+      best = shrinks[k];
+    }
+  }
+  return best;
+}
+
 std::string DescribeProvenance(const Reading& reading) {
   const Provenance made = reading.likeliest();
   return Cat(Describe(made), " (", std::lround(100 * std::min(reading.probability(made), 0.99)), " %)");

@@ -36,6 +36,15 @@ struct Reading {
   double probability(Provenance of) const { return provenance[static_cast<size_t>(of)]; }
 };
 
+// Sizes of training pictures relative to the pictures at hand, as people shrink them. How often they are not shrunk
+// before a splat is known: docs/reading.md has the gains that decided it.
+inline constexpr std::array kPictureShrinks = {1.0, 0.5, 0.25, 0.125};
+inline constexpr double kAsGiven = 0.7;
+
+// The likeliest of `shrinks` for pictures whose pixel is `pixel` (world units). The first is kAsGiven before the splat
+// is read, the others are equally likely.
+double LikeliestShrink(const Reading& reading, double pixel, std::span<const double> shrinks = kPictureShrinks);
+
 // "a classic splat (98 %)": likeliest() and its probability, never 100 %.
 std::string DescribeProvenance(const Reading& reading);
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -51,6 +52,24 @@ TEST(Reading, FollowsTheScaleOfTheSplat) {
     EXPECT_NEAR(other->pixel / reading->pixel / double{factor}, 1, 0.02) << factor;
     EXPECT_NEAR(other->high / other->low, reading->high / reading->low, 0.05) << factor;
   }
+}
+
+TEST(LikeliestShrink, WeighsThePictureSizeAtHandAgainstWhatTheSplatShows) {
+  Reading reading;
+  reading.unit = 2;
+  reading.predictions.resize(1);
+  const auto shrink = [&](double pixel, double seen, double spread) {
+    reading.predictions[0].log_pixel = std::log(seen / reading.unit);
+    reading.predictions[0].log_spread = std::log(spread);
+    return LikeliestShrink(reading, pixel);
+  };
+  EXPECT_EQ(shrink(0.01, 0.01, 0.2), 1);
+  EXPECT_EQ(shrink(0.01, 0.02, 0.2), 0.5);
+  EXPECT_EQ(shrink(0.01, 0.04, 0.2), 0.25);
+  EXPECT_EQ(shrink(0.01, 0.03, 2), 1);     // not known well
+  EXPECT_EQ(shrink(0.01, 0.001, 0.2), 1);  // pictures are not enlarged
+  const std::array<double, 2> wider = {1, 2};
+  EXPECT_EQ(LikeliestShrink(reading, 0.01, wider), 2);
 }
 
 TEST(Reading, GoesByTheMoreCertainOfTheWholeAndItsPlaces) {

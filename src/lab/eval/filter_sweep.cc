@@ -19,7 +19,7 @@ constexpr size_t kMostViews = 20;
 std::span<const double> FilterStrengths() { return kStrengths; }
 
 Result<CameraPixelSizes> TruePixelSizes(const BenchmarkObject& object) {
-  return PixelSizesFromCameras(object.low, object.low_cameras, std::nullopt, object.camera_rule);
+  return PixelSizesFromCameras(object.low, object.low_cameras, object.camera_rule);
 }
 
 double TopOfParabola(std::span<const double> x, std::span<const double> y) {

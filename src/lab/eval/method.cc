@@ -338,7 +338,10 @@ EvalMethod Named(const NamedMethod& method) {
             // it.
             if (method.by_default || (method.auto_pixel_size && ChosenByItself(method))) options.method = "auto";
             options.upscale = task.object.upscale();
-            if (!method.auto_pixel_size) options.cameras = TrainingCameras(task.object);
+            if (!method.auto_pixel_size) {
+              options.cameras = TrainingCameras(task.object);
+              options.train_width = WidestOf(*options.cameras);  // known exactly
+            }
             if (method.TakesPictures()) {
               options.refine.images = task.object.low_project;
               options.refine.hold_out = task.object.hold_out;

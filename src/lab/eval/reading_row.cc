@@ -307,7 +307,7 @@ CameraSet Moved(CameraSet set, const Similarity& move, const WorldOrigin& origin
 }
 
 Result<Buffer<float>> TruePixels(const GaussianCloud& cloud, const CameraSet& low) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraPixelSizes sizes, PixelSizesFromCameras(cloud, low, std::nullopt));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraPixelSizes sizes, PixelSizesFromCameras(cloud, low));
   return std::move(sizes.sizes);
 }
 

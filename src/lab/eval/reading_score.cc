@@ -150,13 +150,20 @@ Decisions GivenDecisions(std::span<const ReadingRow> rows, const std::map<std::s
   return decisions;
 }
 
-Decisions ReadDecisions(std::span<const ReadingRow> rows, std::span<const ReadingModel> models, double loss_weight) {
+Decisions ReadDecisions(std::span<const ReadingRow> rows, std::span<const ReadingModel> models, double loss_weight,
+                        double picture_scale) {
   Decisions decisions;
   for (const ReadingRow& row : rows) {
     ReadingDecision& decision = decisions.emplace_back();
     if (row.features.values.empty()) continue;
     const Reading reading = ReadFrom(row.features, models[static_cast<size_t>(row.fold) % models.size()]);
-    const Treatment treatment = Treat(reading, {.mode = row.tag, .loss_weight = loss_weight});
+    TreatmentRequest request{.mode = row.tag, .loss_weight = loss_weight};
+    if (picture_scale > 0) {
+      if (!(row.pixel > 0)) continue;
+      const double pixel = row.pixel / picture_scale;
+      request.pixel = pixel / LikeliestShrink(reading, pixel);
+    }
+    const Treatment treatment = Treat(reading, request);
     decision.low = reading.low;
     decision.high = reading.high;
     decision.made = NameOf(reading.likeliest());

@@ -43,9 +43,10 @@ Decisions FixedDecisions(std::span<const ReadingRow> rows, const std::string& me
 Decisions GivenDecisions(std::span<const ReadingRow> rows, const std::map<std::string, ReadingDecision>& given);
 
 // Decisions of Read and Treat on the rows' features, each by the model of its fold: models[row.fold] (docs/reading.md).
-// `loss_weight`: TreatmentRequest::loss_weight.
+// `loss_weight`: TreatmentRequest::loss_weight. `picture_scale`: with cameras, of pictures this many times larger than
+// those of the training; 0: without.
 Decisions ReadDecisions(std::span<const ReadingRow> rows, std::span<const ReadingModel> models,
-                        double loss_weight = kLossWeight);
+                        double loss_weight = kLossWeight, double picture_scale = 0);
 
 // Scores `decisions[i]` on rows[i]: first all rows, then unedited splats by kind, then edits, each by name. Rows
 // without gains count for seconds and provenance.

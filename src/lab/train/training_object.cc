@@ -39,7 +39,7 @@ Status TakeSplat(const GaussianCloud& all, std::vector<Camera> fitted, CameraPix
   object.strength = DefaultFilterStrength(object.upscale, object.cloud.render_mode);
   CameraSet low;
   low.cameras = std::move(fitted);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraPixelSizes sizes, PixelSizesFromCameras(object.cloud, low, std::nullopt, rule));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraPixelSizes sizes, PixelSizesFromCameras(object.cloud, low, rule));
   object.pixel_sizes = std::move(sizes.sizes);
   return {};
 }

@@ -220,6 +220,8 @@ Status Score(const ReadingFlags& flags, const SharedFlags& shared) {
       models.push_back(std::move(model));
     }
     deciders.emplace_back("model", ReadDecisions(rows, models, flags.loss_weight));
+    deciders.emplace_back("model, cameras", ReadDecisions(rows, models, flags.loss_weight, 1));
+    deciders.emplace_back("model, cameras 4x as wide", ReadDecisions(rows, models, flags.loss_weight, 4));
   }
   deciders.emplace_back("the list", TodaysDecisions(rows));
   for (const char* method : {"filter", "network"}) {

@@ -100,7 +100,7 @@ def enhance(
 
     enlarge_with: for the method "detail": a network that enlarges pictures, as for :func:`upscale`. The detail it adds is invented.
 
-    Refinement: images: project with the training pictures. hold_out: hold out every Nth view (None: 8, or 0 if the splat was
+    Refinement: images: project with the training pictures, full-size if possible. hold_out: hold out every Nth view (None: 8, or 0 if the splat was
     fitted to all). downscale: average N × N pixels. steps or seconds: how long to run. k: Gaussians to split each into first.
     poses, between: views to use without pictures. half_from, all_from: fractions of the run after which half and all of the
     rays are rendered. rate, rate_decay: factor on the learning rates of ``fit``, and on that by the end. ssim_weight: weight

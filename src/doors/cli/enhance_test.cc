@@ -104,7 +104,7 @@ TEST_F(EnhanceVerb, PixelSizeOfTheCamerasOrOfTheSplat) {
   WriteText(folder_ / "wide.json", R"([{"id":0,"img_name":"a","width":4096,"height":4096,"position":[0,0,-1.7],)"
                                    R"("rotation":[[1,0,0],[0,1,0],[0,0,1]],"fx":4944,"fy":4944}])");
   const ProgramRun wide = RunWords({"enhance", scan_, "-o", folder_ / "wide.ply", "--method", "filter", "--cameras",
-                                    folder_ / "wide.json", "--json"});
+                                    folder_ / "wide.json", "--mode", "classic", "--json"});
   EXPECT_EQ(wide.code, 0);
   EXPECT_THAT(wide.err, HasSubstr("1600"));
   EXPECT_EQ(wide.json()[0]["train_width"], 1600);

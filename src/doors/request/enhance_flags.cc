@@ -74,7 +74,8 @@ void AddPixelSizeFlags(CLI::App& verb, EnhanceFlags& flags) {
   AddModeOption(verb, flags.mode,
                 "Rasterization in training (default: the file's tag, else estimated from the Gaussians)")
       ->group(group);
-  verb.add_option("--train-width", options.train_width, "Image width in training, if smaller than in --cameras")
+  verb.add_option("--train-width", options.train_width,
+                  "Image width in training, if smaller than in --cameras (default: estimated)")
       ->check(Positive())
       ->needs(cameras)
       ->group(group);

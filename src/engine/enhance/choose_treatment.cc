@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
+#include <iterator>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -18,6 +19,7 @@
 #include "enhance/cloud_components.h"
 #include "enhance/filter.h"
 #include "enhance/pixel_size.h"
+#include "enhance/refine_views.h"
 #include "fit/pixel_model.h"
 #include "fit/training_views.h"
 #include "reading/places.h"
@@ -52,7 +54,7 @@ struct KnownPixels {
 // Takes the cameras for those of larger pictures than the splat was fitted to, if its reading makes that likelier.
 void ShrinkPictures(const CameraSet& given, const Reading& reading, CameraPixelSizes& sizes, EnhanceInput& input,
                     EnhanceReport& report) {
-  const int assumed = WidestOf(*input.cameras), widest = WidestOf(given);
+  const int assumed = WidestOf(input.cameras->cameras), widest = WidestOf(given.cameras);
   std::vector<double> shrinks;
   if (assumed < widest) shrinks.push_back(1);
   for (const double shrink : kPictureShrinks) shrinks.push_back(shrink * widest / assumed);
@@ -62,18 +64,17 @@ void ShrinkPictures(const CameraSet& given, const Reading& reading, CameraPixelS
   sizes.median = static_cast<float>(sizes.median / shrink);
   for (Camera& camera : input.cameras->cameras) camera.intrinsics = Scaled(camera.intrinsics, shrink);
   report.train_width.reset();
-  if (const int width = WidestOf(*input.cameras); width < widest) report.train_width = width;
+  if (const int width = WidestOf(input.cameras->cameras); width < widest) report.train_width = width;
 }
 
 // `reading`: null if the cameras' own size is to be believed.
 Result<CameraPixelSizes> PixelsOfCameras(const EnhanceOptions& options, const Reading* reading, EnhanceInput& input,
                                          EnhanceReport& report) {
   const CameraSet& given = *options.cameras;
-  const int widest = WidestOf(given);
+  const int widest = WidestOf(given.cameras);
   if (options.train_width && *options.train_width > widest) {
-    return Error{ErrorCode::kBadArgument,
-                 Cat("--train-width ", *options.train_width, " has no effect: the views of --cameras are only ", widest,
-                     " pixels wide")};
+    return Error{ErrorCode::kBadArgument, Cat("--train-width ", *options.train_width,
+                                              " has no effect: the views are only ", widest, " pixels wide")};
   }
   report.train_width = options.train_width ? options.train_width : AssumedTrainWidth(given);
   if (report.train_width == widest) report.train_width.reset();
@@ -140,15 +141,18 @@ Result<KnownPixels> FindKnownPixels(const EnhanceOptions& options, bool with_pic
     report.pixel_size_source = PixelSizeSource::kGiven;
     return KnownPixels{{static_cast<float>(*options.pixel_size)}, options.pixel_size};
   }
-  if (with_pictures) {  // their cameras took them, at the size used in training
+  if (with_pictures) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(
         TrainingViews project,
         OpenProject(options.refine.images,
                     {.hold_out = 0, .downscale = options.refine.downscale, .origin = options.refine.origin}));
     EnhanceOptions with_cameras = options;
+    RefineOptions refine = options.refine;
+    if (options.background) refine.background = options.background;
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const int times, MeasureTimesLarger(project, refine, input.cloud));
     with_cameras.cameras.emplace().cameras = std::move(project.train);
-    with_cameras.camera_rule = CameraPixelRule::kMedian;
-    with_cameras.train_width = WidestOf(*with_cameras.cameras);  // the training's own pictures
+    const int widest = WidestOf(with_cameras.cameras->cameras);
+    with_cameras.train_width = std::max(1, widest / times);
     report.pixel_size_source = PixelSizeSource::kPictures;
     auto known = PixelsFrom(with_cameras, said, reading, input, report);
     input.cameras.reset();
@@ -187,12 +191,13 @@ bool HasNetwork(const MethodPlan& plan) {
   return plan.method->adds_detail || (plan.start != nullptr && plan.start->adds_detail);
 }
 
-// Reads each component by itself, as merged splats may come from several trainings. Does nothing if there is only one.
-void ReadParts(const MethodPlan& plan, TreatmentRequest request, const Treatment& of_whole, const ReadingModel& model,
-               EnhanceInput& input, EnhanceReport& report) {
+// Reads each component by itself, as merged splats may come from several trainings, and subject and background have
+// different pixels. Returns the pixel sizes in words; empty if there is only one component.
+std::string ReadParts(const MethodPlan& plan, TreatmentRequest request, const Treatment& of_whole,
+                      const ReadingModel& model, EnhanceInput& input, EnhanceReport& report) {
   const CloudComponents components = FindComponents(input.cloud);
   if (components.component.empty() || components.count < 2 || static_cast<size_t>(components.count) > kMostParts)
-    return;
+    return "";
   std::vector<std::vector<int64_t>> rows(static_cast<size_t>(components.count) + 1);  // the last: in no component
   for (int64_t i = 0; i < input.cloud.size(); ++i) {
     const int32_t part = components.component[static_cast<size_t>(i)];
@@ -200,6 +205,7 @@ void ReadParts(const MethodPlan& plan, TreatmentRequest request, const Treatment
   }
   request.mode = of_whole.mode;
   std::vector<Treatment> treatments;
+  Buffer<float> used;
   double least = of_whole.pixel > 0 ? of_whole.pixel : report.reading->low;
   const double nothing = kNextToNothing * report.reading->pixel;
   for (size_t k = 0; k + 1 < rows.size(); ++k) {
@@ -208,6 +214,7 @@ void ReadParts(const MethodPlan& plan, TreatmentRequest request, const Treatment
     const auto reading = part.ok() ? Read(*part, model) : Result<Reading>(part.error());
     Treatment& treatment = treatments.emplace_back();
     if (reading.ok()) treatment = Treat(*reading, request);
+    if (treatment.method != TreatmentMethod::kNone) used.push_back(static_cast<float>(treatment.pixel));
     if (treatment.method == TreatmentMethod::kNone) treatment.pixel = nothing;
     least = std::min(least, treatment.pixel);
     report.parts.push_back({std::ssize(rows[k]), treatment.pixel, treatment.method == TreatmentMethod::kNetwork});
@@ -221,24 +228,29 @@ void ReadParts(const MethodPlan& plan, TreatmentRequest request, const Treatment
       by_network[static_cast<size_t>(i)] = treatments[k].method == TreatmentMethod::kNetwork ? 1 : 0;
     }
   }
-  Buffer<float> sizes = input.pixel_sizes;
-  report.pixel_size = double{Quantile(sizes, 0.5)};
+  Buffer<float> sharpened;
+  std::ranges::copy_if(input.pixel_sizes, std::back_inserter(sharpened), [=](float size) { return size > nothing; });
+  if (!sharpened.empty()) report.pixel_size = double{Quantile(sharpened, 0.5)};
   const auto taken = std::ranges::count(by_network, 1);
   if (plan.start == nullptr && plan.method->adds_detail && taken < std::ssize(by_network)) {
     input.by_network = std::move(by_network);
   }
-  LogInfo(Cat("found ", components.count, " separate parts; each gets its own pixel size"));
+  std::string text = "Leaving";
+  if (!used.empty()) text = Cat("Using ", std::ranges::min(used), " to ", std::ranges::max(used), " in");
+  const int64_t some = used.empty() ? components.count : std::ssize(used);
+  return Cat(text, some < components.count ? Cat(" ", some, " of") : "", " its ", components.count, " separate parts");
 }
 
-// Pixel sizes per place: parts seen from near have smaller pixels than parts seen from afar.
-void ReadPlaces(const ReadingModel& model, EnhanceInput& input, EnhanceReport& report) {
+// Pixel sizes per place: parts seen from near have smaller pixels than parts seen from afar. Returns them in words;
+// empty if they do not vary.
+std::string ReadPlaces(const ReadingModel& model, EnhanceInput& input, EnhanceReport& report) {
   Buffer<float> ratios = PixelRatios(input.cloud, model);
-  if (ratios.empty()) return;
+  if (ratios.empty()) return "";
   for (float& ratio : ratios) ratio *= static_cast<float>(report.pixel_size);
   input.pixel_sizes = ratios;
   report.pixel_size_range = {double{Quantile(ratios, 0.1)}, double{Quantile(ratios, 0.9)}};
-  LogInfo(Cat("pixel size varies across the splat: using ", report.pixel_size_range->first, " to ",
-              report.pixel_size_range->second));
+  return Cat("Using ", report.pixel_size_range->first, " to ", report.pixel_size_range->second,
+             ", as it varies across the splat");
 }
 
 // ". --model and --copies have no effect", of those that were given; empty: none was.
@@ -270,12 +282,15 @@ void SayNothingIsDone(const EnhanceOptions& options, const EnhanceReport& report
                                       mode, " to enhance it anyway"));
 }
 
-void SayWhatIsTaken(const Treatment& treatment, const EnhanceReport& report) {
+// `sizes`: pixel sizes that vary, in words; may be empty.
+void SayWhatIsTaken(const Treatment& treatment, const std::string& sizes, const EnhanceReport& report) {
   const Reading& reading = *report.reading;
   std::string text = Cat("looks like ", DescribeProvenance(reading));
   if (report.pixel_size_source == PixelSizeSource::kRead) {
-    text += Cat(". Estimated training pixel: ", reading.pixel, " (likely ", reading.low, " to ", reading.high,
-                "). Using ", treatment.pixel, treatment.gain > 0 ? ", which should look best" : " to be safe",
+    text += Cat(". Estimated training pixel: ", reading.pixel, " (likely ", reading.low, " to ", reading.high, "). ",
+                sizes.empty()
+                    ? Cat("Using ", treatment.pixel, treatment.gain > 0 ? ", which should look best" : " to be safe")
+                    : sizes,
                 ". Pass --cameras or --pixel-size for the exact size");
   }
   LogInfo(text);
@@ -384,21 +399,22 @@ Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceI
   report.pixel_size = known.pixel.value_or(taken);
   input.pixel_sizes = std::move(known.sizes);
   if (input.pixel_sizes.empty()) input.pixel_sizes.assign(1, static_cast<float>(taken));
+  std::string sizes;
+  if (!none && !known.pixel && !part_alone && !options.filter_strength) {
+    sizes = ReadParts(plan, request, treatment, model, input, report);
+    if (sizes.empty()) sizes = ReadPlaces(model, input, report);
+  }
   if (closer && lost_nothing.empty() && reading.ok()) {
     if (none && !stays) {
       LogInfo(Cat("looks like ", DescribeProvenance(*reading), ", which needs no sharpening; only detail is added"));
     } else if (none && !options.filter_strength) {
       SayNothingIsDone(options, report, cloud.render_mode);
     } else if (!(said && known.pixel)) {  // else nothing was taken from the reading
-      SayWhatIsTaken(treatment, report);
+      SayWhatIsTaken(treatment, sizes, report);
     }
   }
   if (closer && !none && known.pixel && reading.ok() && lost_nothing.empty() && treatment.pixel == *known.pixel) {
     SayIfUnlike(options, report);
-  }
-  if (!none && !known.pixel && !part_alone && !options.filter_strength) {
-    ReadParts(plan, request, treatment, model, input, report);
-    if (report.parts.empty()) ReadPlaces(model, input, report);
   }
   input.pixel_size = report.pixel_size;
   return {};

@@ -116,15 +116,15 @@ CameraSet AtTrainWidth(CameraSet cameras, int train_width) {
   return cameras;
 }
 
-int WidestOf(const CameraSet& cameras) {
+int WidestOf(std::span<const Camera> cameras) {
   int widest = 0;
-  for (const Camera& camera : cameras.cameras) widest = std::max(widest, camera.intrinsics.width);
+  for (const Camera& camera : cameras) widest = std::max(widest, camera.intrinsics.width);
   return widest;
 }
 
 std::optional<int> AssumedTrainWidth(const CameraSet& cameras) {
   if (cameras.source != CameraSource::kInria && cameras.source != CameraSource::kColmap) return std::nullopt;
-  return WidestOf(cameras) > kInriaTrainWidth ? std::optional(kInriaTrainWidth) : std::nullopt;
+  return WidestOf(cameras.cameras) > kInriaTrainWidth ? std::optional(kInriaTrainWidth) : std::nullopt;
 }
 
 }  // namespace anchorsplat

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 
 #include "core/camera.h"
@@ -33,7 +34,7 @@ Result<CameraPixelSizes> PixelSizesFromCameras(const GaussianCloud& cloud, const
 
 // Cameras of views at the size used in training: those wider than `train_width` pixels (at least 1) become that wide.
 CameraSet AtTrainWidth(CameraSet cameras, int train_width);
-int WidestOf(const CameraSet& cameras);  // pixels; 0 if there are none
+int WidestOf(std::span<const Camera> cameras);  // pixels; 0 if there are none
 
 // Training width to assume if the user gives none. INRIA's trainer and its successors reduce wider images to 1600
 // pixels, but their cameras.json and COLMAP models keep the original size. Unset for narrower cameras and for

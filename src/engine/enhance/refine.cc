@@ -229,6 +229,9 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
                    " Gaussians with the least opacity × size"));
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(RefineViews views, OpenRefineViews(input, options));
+  // Larger pictures show part of the closer view, or all of it.
+  input.upscale = std::max(1.0, input.upscale / views.times_larger);
+  if (options.enlarged) input.upscale = std::round(input.upscale);
   const bool resumes = control.resume && Exists(control.checkpoint);
   ANCHORSPLAT_ASSIGN_OR_RETURN(report.plan, PlanRefinement(input, as_it_is, options, resumes, views));
   const RefinePlan& plan = report.plan;

@@ -45,7 +45,7 @@ const std::vector<MethodOption>& RefinementOptions() {
   static const std::vector<MethodOption> options = {
       {"images",
        In<&RefineOptions::images>,
-       "Project with the training pictures (as for `fit`): the best reference for refinement",
+       "Project with the training pictures (as for `fit`), full-size if possible: the best reference for refinement",
        {},
        {},
        "PROJECT"},
@@ -58,7 +58,7 @@ const std::vector<MethodOption>& RefinementOptions() {
        WithImages},
       {"downscale",
        In<&RefineOptions::downscale>,
-       "With --images: average N x N pixels, if the splat was fitted to smaller pictures",
+       "With --images: average N x N pixels",
        {1, kMaxDownscale},
        WithImages},
       {"steps",

@@ -34,6 +34,9 @@ inline constexpr int kLeastSide = 24;
 Result<PictureAgreement> MeasureAgreement(const GaussianCloud& cloud, const RenderOptions& render,
                                           PictureCache& pictures);
 
+// How many times larger per side the pictures are than those the splat was fitted to: 1, 2, 4, …
+int TimesLarger(const PictureAgreement& agreement);
+
 // kBadArgument, with advice, if pictures and splat do not belong together; a warning if a few pictures do not.
 // `aligned`:
 // poses will be corrected, so they may be off.

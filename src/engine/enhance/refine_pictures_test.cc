@@ -8,6 +8,8 @@
 
 #include "cameras/camera_io.h"
 #include "core/log.h"
+#include "core/messages_for_test.h"
+#include "enhance/enhance.h"
 #include "enhance/refinement_for_test.h"
 #include "fit/orbit_scene_for_test.h"
 #include "fit/training_views.h"
@@ -43,14 +45,6 @@ TEST_F(Refinement, BadPicturesAreRefusedAtOnce) {
   ASSERT_TRUE(WritePng(first, Image(kSide, kSide / 2, 3), {.overwrite = true}).ok());
   EXPECT_THAT(message(), testing::AllOf(HasSubstr("28x14"), HasSubstr("28x28")));
   ASSERT_TRUE(WritePng(first, whole, {.overwrite = true}).ok());
-  // Larger than those that it was fitted to, of the same shape.
-  replace([](const Image& picture) {
-    Image large;
-    SpreadToRays(picture, {0, 0, picture.width, picture.height}, 4, large);
-    for (float& x : large.pixels) x *= 16;
-    return large;
-  });
-  EXPECT_THAT(message(), HasSubstr("at 1/4 of their size"));
   replace([](const Image&) {
     Image black(kSide, kSide, 3);
     std::fill(black.pixels.begin(), black.pixels.end(), 0.0f);
@@ -62,6 +56,33 @@ TEST_F(Refinement, BadPicturesAreRefusedAtOnce) {
   for (size_t i = 0; i < dark.sh.size(); ++i) dark.sh[i] = 0.3f * dark.sh[i] - 1.2f;
   input_.cloud = dark;
   EXPECT_THAT(message(), HasSubstr("9 of 9 pictures match a single colour"));
+}
+
+// Pictures larger than those it was fitted to: they give its pixel size, and their own detail.
+TEST_F(Refinement, LargerPicturesAreRefinedAgainstAsTheyAre) {
+  EnhanceOptions options;
+  options.mode = RenderMode::kClassic;
+  options.upscale = kUpscale;
+  options.method = "filter+refine-images";
+  options.refine = options_;
+  const auto of_small = Enhance(input_.cloud, options);
+  ASSERT_TRUE(of_small.ok()) << of_small.error().message;
+  EXPECT_FALSE(of_small->report.train_width);
+  Rasterizer rasterizer;
+  RenderOutput large;
+  for (Camera camera : cameras_.cameras) {
+    camera.intrinsics = Scaled(camera.intrinsics, 4);
+    ASSERT_TRUE(rasterizer.Render(truth_, camera, {}, large).ok());
+    ASSERT_TRUE(WritePng(project() / (camera.name + ".png"), large.color, {.overwrite = true}).ok());
+  }
+  const Messages messages;
+  const auto of_large = Enhance(input_.cloud, options);
+  ASSERT_TRUE(of_large.ok()) << of_large.error().message;
+  EXPECT_EQ(of_large->report.pixel_size_source, PixelSizeSource::kPictures);
+  EXPECT_EQ(of_large->report.train_width, kSide);
+  EXPECT_NEAR(of_large->report.pixel_size, of_small->report.pixel_size, 1e-6);
+  EXPECT_THAT(messages.notes(), testing::Contains(HasSubstr("pictures at 1/4 of this size")));
+  EXPECT_GT(PsnrCloser(of_large->cloud), PsnrCloser(of_small->cloud) + 0.5);
 }
 
 TEST_F(Refinement, PicturesOfSomethingElseAreRefused) {

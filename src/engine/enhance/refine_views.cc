@@ -14,7 +14,6 @@
 #include "enhance/refine_pictures.h"
 #include "enhance/refine_poses.h"
 #include "enhance/refiner.h"
-#include "fit/training_views.h"
 #include "fit/view_exposure.h"
 #include "fit/view_pose.h"
 #include "metrics/image_metrics.h"
@@ -59,6 +58,10 @@ Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& 
   LogInfo(Cat(project.train.size(), " views with pictures, ", project.held_out.size(),
               " held out; renders of the splat match them with ", Fixed(agreement.psnr, 2), " dB"));
   ANCHORSPLAT_RETURN_IF_ERROR(CheckAgreement(agreement, kLeastInputPsnr, options.align));
+  if (const int times = TimesLarger(agreement); times > 1) {
+    LogInfo(Cat("the splat was fitted to pictures at 1/", times, " of this size (match ",
+                Fixed(agreement.smaller_psnr, 2), " dB); using the detail of the larger ones"));
+  }
   if (!options.hold_out && !project.held_out.empty()) {
     PictureCache held_out(project.held_out, render.background);
     ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureAgreement others, MeasureAgreement(input.cloud, render, held_out));
@@ -78,7 +81,10 @@ Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& 
   const auto& check = project.held_out.empty() ? project.train : project.held_out;
   return RefineViews{RefineTargets(std::move(pictures)),
                      RefineTargets(PictureCache(SubsampleEvenly(check, kCheckViews), render.background)),
-                     agreement.psnr, project.scene_scale, render};
+                     agreement.psnr,
+                     TimesLarger(agreement),
+                     project.scene_scale,
+                     render};
 }
 
 Result<RefineViews> OpenSplat(const RefineInput& input, const RefineOptions& options, RenderOptions render) {
@@ -102,10 +108,22 @@ Result<RefineViews> OpenSplat(const RefineInput& input, const RefineOptions& opt
   const double scale = SceneScale(poses.train);
   const auto splat = std::make_shared<const GaussianCloud>(input.cloud);
   return RefineViews{RefineTargets(splat, render, std::move(poses.train)),
-                     RefineTargets(splat, render, std::move(poses.check)), std::nullopt, scale, render};
+                     RefineTargets(splat, render, std::move(poses.check)),
+                     std::nullopt,
+                     1,
+                     scale,
+                     render};
 }
 
 }  // namespace
+
+Result<int> MeasureTimesLarger(const TrainingViews& project, const RefineOptions& options, const GaussianCloud& cloud) {
+  RenderOptions render = DisplayOptions(cloud);
+  render.background = BackgroundFor(options, project.background, cloud);
+  PictureCache pictures(project.train, render.background);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureAgreement agreement, MeasureAgreement(cloud, render, pictures));
+  return TimesLarger(agreement);
+}
 
 Result<RefineViews> OpenRefineViews(const RefineInput& input, const RefineOptions& options) {
   const RenderOptions render = DisplayOptions(input.cloud);

@@ -9,6 +9,7 @@
 #include "core/result.h"
 #include "enhance/refine.h"
 #include "enhance/refine_targets.h"
+#include "fit/training_views.h"
 #include "render/rasterizer.h"
 
 namespace anchorsplat {
@@ -17,9 +18,13 @@ namespace anchorsplat {
 struct RefineViews {
   RefineTargets train, check;
   std::optional<double> input_psnr;
+  int times_larger = 1;  // sides of the pictures over those of the pictures the splat was fitted to
   double scene_scale = 1;
   RenderOptions render;
 };
+
+// How many times larger per side the pictures of `project` are than those `cloud` was fitted to: 1, 2, 4, …
+Result<int> MeasureTimesLarger(const TrainingViews& project, const RefineOptions& options, const GaussianCloud& cloud);
 
 // Opens the views that `options` and `input` name: pictures, cameras, or poses around the splat. Errors: see Refine.
 Result<RefineViews> OpenRefineViews(const RefineInput& input, const RefineOptions& options);

@@ -340,7 +340,7 @@ EvalMethod Named(const NamedMethod& method) {
             options.upscale = task.object.upscale();
             if (!method.auto_pixel_size) {
               options.cameras = TrainingCameras(task.object);
-              options.train_width = WidestOf(*options.cameras);  // known exactly
+              options.train_width = WidestOf(options.cameras->cameras);  // known exactly
             }
             if (method.TakesPictures()) {
               options.refine.images = task.object.low_project;

@@ -217,11 +217,12 @@ TEST(CloudIo, SaysWhatSomethingElseIs) {
   EXPECT_CONTAINS(other("<!DOCTYPE html>"), "is a web page, not a splat");
   EXPECT_CONTAINS(other("x"), "byte 0: is not in a known splat format: found \"x\"");
   EXPECT_CONTAINS(other("\x01\x02\x03\x80"), "are recognised by name only");
-  EXPECT_CONTAINS(other("{\"camera_angle_x\": 0.7, \"frames\": []}"), "looks like a camera file; pass cameras with");
+  EXPECT_CONTAINS(other("{\"camera_angle_x\": 0.7, \"frames\": []}"),
+                  "looks like a camera file, not a splat; pass cameras with");
   ASSERT_TRUE(WriteWholeFile(folder / "images.bin", std::string_view("\0\1", 2), true).ok());
   EXPECT_CONTAINS(ReadError(folder / "images.bin"), "looks like part of a COLMAP model");
   fs::create_directories(folder / "scan/sparse");
-  EXPECT_CONTAINS(ReadError(folder / "scan"), "looks like a project with cameras; pass");
+  EXPECT_CONTAINS(ReadError(folder / "scan"), "looks like a project with cameras, not a splat; pass");
 }
 
 TEST(Registry, RowsAreConsistent) {

@@ -33,7 +33,8 @@ std::string ReadFormats() {
 
 // What a user may have meant by something that is not a splat; empty if unclear.
 std::string HintFor(const fs::path& path, std::string_view head) {
-  constexpr const char* kPass = "; pass cameras with --cameras, or the project to `fit`";
+  constexpr const char* kPass =
+      ", not a splat; pass cameras with --cameras, pictures as their folder, or the project to `fit`";
   if (IsFolder(path)) {
     for (const char* part : {"sparse", "cameras.bin", "cameras.txt", "transforms.json", "transforms_train.json"}) {
       if (Exists(path / part)) return Cat("; it looks like a project with cameras", kPass);
@@ -126,8 +127,9 @@ Result<GaussianCloud> OpenedSplat::Read(const ReadLimits& limits, ExtraPropertie
     if (hint.empty() && !IsText(head.substr(0, 16))) {
       hint = "; .splat and .ksplat files are recognised by name only: rename the file, or use convert --from .splat";
     }
-    return Error{ErrorCode::kBadFile, Cat(input_.name(), ": byte 0: is not in a known splat format: found \"",
-                                          Printable(head.substr(0, 8)), "\"", hint, "; expected ", ReadFormats())};
+    const std::string found =
+        Cat(input_.name(), ": byte 0: is not in a known splat format: found \"", Printable(head.substr(0, 8)), "\"");
+    return Error{ErrorCode::kBadFile, Cat(found, hint.empty() ? Cat("; expected ", ReadFormats()) : hint)};
   }
   if (format_->read == nullptr) {
     return Error{ErrorCode::kBadFile,

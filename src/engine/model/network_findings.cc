@@ -9,7 +9,9 @@
 #include "formats/gsplat_checkpoint/gsplat_checkpoint.h"
 #include "io/input_file.h"
 #include "published/published_checkpoint_writer.h"
+#include "reading/reading_model.h"
 #include "tensors/tensor_file.h"
+#include "upscale/upscaler.h"
 
 namespace anchorsplat {
 
@@ -40,6 +42,22 @@ Result<ModelFindings> LookAtCheckpoint(const std::string& path) {
   return found;
 }
 
+// The program's other networks; `kind` says what for.
+ModelFindings LookAtOther(const TensorFile& file, const std::string& kind) {
+  ModelFindings found{file.metadata(), {}, file.tensors().size()};
+  found.facts.erase("features");  // hundreds of names: bench reading --features
+  found.facts["kind"] = kind;
+  for (const TensorEntry& tensor : file.tensors()) found.learned.push_back({tensor.name, tensor.shape});
+  return found;
+}
+
+Result<ModelFindings> LookAt(const std::string& path, const TensorFile& file) {
+  if (IsCompactNetwork(file)) return LookAtCompactNetwork(file);
+  if (ReadingModel::Load(file).ok()) return LookAtOther(file, "reads splats");
+  if (Upscaler::Read(path).ok()) return LookAtOther(file, "enlarges pictures");
+  return LookAtCheckpoint(path);
+}
+
 }  // namespace
 
 bool LooksLikeNetwork(const std::filesystem::path& path) {
@@ -55,8 +73,7 @@ bool LooksLikeNetwork(const std::filesystem::path& path) {
 
 Result<NetworkFindings> InspectNetwork(const std::string& path) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const TensorFile file, TensorFile::Open(path));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(ModelFindings found,
-                               IsCompactNetwork(file) ? LookAtCompactNetwork(file) : LookAtCheckpoint(path));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(ModelFindings found, LookAt(path, file));
   NetworkFindings findings{path, std::move(found.facts), found.tensors, 0};
   for (const TensorSpec& tensor : found.learned) {
     int64_t size = 1;

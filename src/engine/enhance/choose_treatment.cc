@@ -1,6 +1,7 @@
 #include "enhance/choose_treatment.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <initializer_list>
 #include <iterator>
@@ -130,6 +131,23 @@ Result<KnownPixels> PixelsFrom(const EnhanceOptions& options, bool said, const R
   return known;
 }
 
+// How many times larger per side pictures are than those the splat was fitted to, by how well they match it at each
+// size and, if that does not settle it, by its reading.
+Result<int> TimesLarger(const EnhanceOptions& options, const TrainingViews& project, const Reading* reading,
+                        const GaussianCloud& cloud) {
+  RefineOptions refine = options.refine;
+  if (options.background) refine.background = options.background;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureAgreement agreement, MeasureAgreementWith(project, refine, cloud));
+  const int times = TimesLarger(agreement);
+  if (times > 1 || reading == nullptr || agreement.smaller_psnr <= agreement.psnr) return times;
+  CameraSet cameras;
+  cameras.cameras = project.train;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const CameraPixelSizes sizes,
+                               PixelSizesFromCameras(cloud, cameras, options.camera_rule));
+  const std::array<double, 2> shrinks = {1, 1.0 / agreement.smaller};
+  return LikeliestShrink(*reading, double{sizes.median}, shrinks) < 1 ? agreement.smaller : 1;
+}
+
 // Pixel sizes known before the reading.
 Result<KnownPixels> FindKnownPixels(const EnhanceOptions& options, bool with_pictures, bool said,
                                     const Result<Reading>& reading, EnhanceInput& input, EnhanceReport& report) {
@@ -147,15 +165,17 @@ Result<KnownPixels> FindKnownPixels(const EnhanceOptions& options, bool with_pic
         OpenProject(options.refine.images,
                     {.hold_out = 0, .downscale = options.refine.downscale, .origin = options.refine.origin}));
     EnhanceOptions with_cameras = options;
-    RefineOptions refine = options.refine;
-    if (options.background) refine.background = options.background;
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const int times, MeasureTimesLarger(project, refine, input.cloud));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(
+        input.times_larger, TimesLarger(options, project, said || !reading.ok() ? nullptr : &*reading, input.cloud));
     with_cameras.cameras.emplace().cameras = std::move(project.train);
-    const int widest = WidestOf(with_cameras.cameras->cameras);
-    with_cameras.train_width = std::max(1, widest / times);
+    for (Camera& camera : with_cameras.cameras->cameras) {
+      camera.intrinsics = Scaled(camera.intrinsics, 1.0 / *input.times_larger);
+    }
+    with_cameras.train_width = WidestOf(with_cameras.cameras->cameras);
     report.pixel_size_source = PixelSizeSource::kPictures;
     auto known = PixelsFrom(with_cameras, said, reading, input, report);
     input.cameras.reset();
+    if (*input.times_larger > 1) report.train_width = with_cameras.train_width;
     return known;
   }
   report.pixel_size_source = PixelSizeSource::kRead;

@@ -137,6 +137,7 @@ struct EnhanceInput {
   Buffer<float> pixel_sizes;         // p_LR, world units, one for all or one per Gaussian
   double pixel_size = 0;             // their median
   std::optional<CameraSet> cameras;  // training cameras at the size used in training, if they were given
+  std::optional<int> times_larger;   // RefineInput::times_larger
   double filter_strength = 0;
   std::vector<char> by_network;   // [N] whether to use the network for each Gaussian; empty: for all
   bool partly_enhanced = false;   // another part is marked as enhanced, so only Gaussians inside count for readings

@@ -229,9 +229,12 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
                    " Gaussians with the least opacity × size"));
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(RefineViews views, OpenRefineViews(input, options));
-  // Larger pictures show part of the closer view, or all of it.
-  input.upscale = std::max(1.0, input.upscale / views.times_larger);
-  if (options.enlarged) input.upscale = std::round(input.upscale);
+  if (const int times = input.times_larger.value_or(views.times_larger); times > 1) {
+    LogInfo(Cat("the splat was fitted to pictures at 1/", times, " of this size; using the detail of these"));
+    // They show part of the closer view, or all of it.
+    input.upscale = std::max(1.0, input.upscale / times);
+    if (options.enlarged) input.upscale = std::round(input.upscale);
+  }
   const bool resumes = control.resume && Exists(control.checkpoint);
   ANCHORSPLAT_ASSIGN_OR_RETURN(report.plan, PlanRefinement(input, as_it_is, options, resumes, views));
   const RefinePlan& plan = report.plan;

@@ -27,6 +27,7 @@ struct RefineInput {
   double upscale = 4;                // u, 1 to kMostSamples
   double pixel_size = 0;             // world units; only needed without pictures and cameras
   std::optional<CameraSet> cameras;  // the training cameras, used without pictures
+  std::optional<int> times_larger;   // sides of the pictures over those of the pictures fitted to; unset: measured
   uint64_t seed = 0;
 };
 

@@ -46,6 +46,7 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
   refine.upscale = options.upscale;
   refine.pixel_size = input.pixel_size;
   refine.cameras = std::move(input.cameras);
+  refine.times_larger = input.times_larger;
   refine.seed = options.seed;
   refine.start_has_detail = input.start_has_detail;
   refine.start = std::move(input.start);

@@ -11,7 +11,6 @@
 #include "core/splat_comments.h"
 #include "core/text.h"
 #include "enhance/enlarged_targets.h"
-#include "enhance/refine_pictures.h"
 #include "enhance/refine_poses.h"
 #include "enhance/refiner.h"
 #include "fit/view_exposure.h"
@@ -58,10 +57,6 @@ Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& 
   LogInfo(Cat(project.train.size(), " views with pictures, ", project.held_out.size(),
               " held out; renders of the splat match them with ", Fixed(agreement.psnr, 2), " dB"));
   ANCHORSPLAT_RETURN_IF_ERROR(CheckAgreement(agreement, kLeastInputPsnr, options.align));
-  if (const int times = TimesLarger(agreement); times > 1) {
-    LogInfo(Cat("the splat was fitted to pictures at 1/", times, " of this size (match ",
-                Fixed(agreement.smaller_psnr, 2), " dB); using the detail of the larger ones"));
-  }
   if (!options.hold_out && !project.held_out.empty()) {
     PictureCache held_out(project.held_out, render.background);
     ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureAgreement others, MeasureAgreement(input.cloud, render, held_out));
@@ -117,12 +112,12 @@ Result<RefineViews> OpenSplat(const RefineInput& input, const RefineOptions& opt
 
 }  // namespace
 
-Result<int> MeasureTimesLarger(const TrainingViews& project, const RefineOptions& options, const GaussianCloud& cloud) {
+Result<PictureAgreement> MeasureAgreementWith(const TrainingViews& project, const RefineOptions& options,
+                                              const GaussianCloud& cloud) {
   RenderOptions render = DisplayOptions(cloud);
   render.background = BackgroundFor(options, project.background, cloud);
   PictureCache pictures(project.train, render.background);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureAgreement agreement, MeasureAgreement(cloud, render, pictures));
-  return TimesLarger(agreement);
+  return MeasureAgreement(cloud, render, pictures);
 }
 
 Result<RefineViews> OpenRefineViews(const RefineInput& input, const RefineOptions& options) {

@@ -8,6 +8,7 @@
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "enhance/refine.h"
+#include "enhance/refine_pictures.h"
 #include "enhance/refine_targets.h"
 #include "fit/training_views.h"
 #include "render/rasterizer.h"
@@ -23,8 +24,9 @@ struct RefineViews {
   RenderOptions render;
 };
 
-// How many times larger per side the pictures of `project` are than those `cloud` was fitted to: 1, 2, 4, …
-Result<int> MeasureTimesLarger(const TrainingViews& project, const RefineOptions& options, const GaussianCloud& cloud);
+// MeasureAgreement (enhance/refine_pictures.h) with the pictures of `project` over their background.
+Result<PictureAgreement> MeasureAgreementWith(const TrainingViews& project, const RefineOptions& options,
+                                              const GaussianCloud& cloud);
 
 // Opens the views that `options` and `input` name: pictures, cameras, or poses around the splat. Errors: see Refine.
 Result<RefineViews> OpenRefineViews(const RefineInput& input, const RefineOptions& options);

@@ -175,9 +175,10 @@ std::string SourceInWords(PixelSizeSource source) {
 std::string Details(const EnhanceReport& r) {
   if (r.pixel_size_source == PixelSizeSource::kNone) return "";
   if (r.pixel_size_source == PixelSizeSource::kUnknown) return ", left unchanged";
-  if (r.filter_strength == 0) return IsInvented(r) ? Cat(" ", r.upscale, "x") : ", left unchanged";
-  return Cat(" ", r.upscale, "x, filter strength ", Fixed(r.filter_strength, 2), ", pixel size ", r.pixel_size, " (",
-             SourceInWords(r.pixel_size_source), ")");
+  const char* invented = IsInvented(r) ? ", detail invented" : "";
+  if (r.filter_strength == 0) return *invented != 0 ? Cat(" ", r.upscale, "x", invented) : ", left unchanged";
+  return Cat(" ", r.upscale, "x", invented, ", filter strength ", Fixed(r.filter_strength, 2), ", pixel size ",
+             r.pixel_size, " (", SourceInWords(r.pixel_size_source), ")");
 }
 
 // Removes the extras of unusable Gaussians. Returns the means of the others, to check later whether the Gaussians are

@@ -1,7 +1,6 @@
 #include "enhance/choose_treatment.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <initializer_list>
 #include <iterator>
@@ -19,10 +18,8 @@
 #include "core/text.h"
 #include "enhance/cloud_components.h"
 #include "enhance/filter.h"
-#include "enhance/pixel_size.h"
-#include "enhance/refine_views.h"
+#include "enhance/known_pixels.h"
 #include "fit/pixel_model.h"
-#include "fit/training_views.h"
 #include "reading/places.h"
 #include "reading/treatment.h"
 #include "render/constants.h"
@@ -33,10 +30,6 @@ namespace {
 
 // Closer views than this lose with a network against the filter: 0.2 dB at 1.1, 0.3 at 1.2.
 constexpr double kLeastUpscaleOfNetworks = 1.35;
-// Cameras do not belong to the splat if their pixels are this many times larger than its own, with 99 % certainty.
-constexpr double kFarOff = 2;
-// One-sided 99 % over two-sided 80 % half-interval of a Laplace distribution: ln 50 / ln 5.
-constexpr double kCertain = 2.43;
 // With more components, they are not read one by one.
 constexpr size_t kMostParts = 12;
 // Relative to the whole splat's pixel: too small to add visible width.
@@ -44,156 +37,6 @@ constexpr double kNextToNothing = 0.02;
 
 bool ShowsNothing(const GaussianCloud& cloud) {
   return std::ranges::none_of(cloud.opacity_logits, [](float logit) { return Sigmoid(logit) >= kMinAlpha; });
-}
-
-// Pixel sizes from cameras or the caller, before any reading.
-struct KnownPixels {
-  Buffer<float> sizes;          // one or [N]; empty: to be read off the splat
-  std::optional<double> pixel;  // their median
-};
-
-// Takes the cameras for those of larger pictures than the splat was fitted to, if its reading makes that likelier.
-void ShrinkPictures(const CameraSet& given, const Reading& reading, CameraPixelSizes& sizes, EnhanceInput& input,
-                    EnhanceReport& report) {
-  const int assumed = WidestOf(input.cameras->cameras), widest = WidestOf(given.cameras);
-  std::vector<double> shrinks;
-  if (assumed < widest) shrinks.push_back(1);
-  for (const double shrink : kPictureShrinks) shrinks.push_back(shrink * widest / assumed);
-  const double shrink = LikeliestShrink(reading, double{sizes.median}, shrinks);
-  if (shrink == 1) return;
-  for (float& size : sizes.sizes) size = static_cast<float>(size / shrink);
-  sizes.median = static_cast<float>(sizes.median / shrink);
-  for (Camera& camera : input.cameras->cameras) camera.intrinsics = Scaled(camera.intrinsics, shrink);
-  report.train_width.reset();
-  if (const int width = WidestOf(input.cameras->cameras); width < widest) report.train_width = width;
-}
-
-// `reading`: null if the cameras' own size is to be believed.
-Result<CameraPixelSizes> PixelsOfCameras(const EnhanceOptions& options, const Reading* reading, EnhanceInput& input,
-                                         EnhanceReport& report) {
-  const CameraSet& given = *options.cameras;
-  const int widest = WidestOf(given.cameras);
-  if (options.train_width && *options.train_width > widest) {
-    return Error{ErrorCode::kBadArgument, Cat("--train-width ", *options.train_width,
-                                              " has no effect: the views are only ", widest, " pixels wide")};
-  }
-  report.train_width = options.train_width ? options.train_width : AssumedTrainWidth(given);
-  if (report.train_width == widest) report.train_width.reset();
-  input.cameras = AtTrainWidth(given, report.train_width.value_or(widest));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraPixelSizes sizes,
-                               PixelSizesFromCameras(input.cloud, *input.cameras, options.camera_rule));
-  if (sizes.unseen == input.cloud.size()) {
-    return Error{ErrorCode::kBadArgument,
-                 "no camera sees any of the Gaussians: pass the cameras of this splat, in its unit and axes"};
-  }
-  if (sizes.unseen > 0) {
-    const std::string text = Cat(WithThousands(sizes.unseen), " of ", WithThousands(input.cloud.size()),
-                                 " Gaussians lie outside all views; using the pixel size of the nearest camera");
-    2 * sizes.unseen > input.cloud.size() ? LogWarning(text + ". Check that --cameras belong to this splat")
-                                          : LogInfo(text);
-  }
-  report.camera_rule = sizes.rule == CameraPixelRule::kMedian ? "median" : "smallest";
-  if (!sizes.why.empty()) LogInfo(Cat("using --camera-rule ", report.camera_rule, ", as ", sizes.why));
-  if (options.train_width) return sizes;
-  const std::optional<int> assumed = report.train_width;
-  if (reading != nullptr) ShrinkPictures(given, *reading, sizes, input, report);
-  if (report.train_width && report.train_width != assumed) {
-    LogWarning(Cat("the splat looks fitted to pictures ", *report.train_width, " pixels wide, not ", widest,
-                   ". If it was not, pass their width with --train-width"));
-  } else if (report.train_width) {
-    LogWarning(Cat("assuming that training shrank the views to ", *report.train_width,
-                   " pixels, as INRIA's trainer does. If it did not, pass their width with --train-width"));
-  }
-  return sizes;
-}
-
-// The only check of cameras: whether the splat's own pixels were certainly far smaller than theirs.
-bool AreFarOff(double median, const Result<Reading>& reading) {
-  if (!reading.ok() || reading->strangeness > 1) return false;
-  const double half = std::log(reading->high / reading->pixel);
-  return std::log(median / reading->pixel) > std::log(kFarOff) + kCertain * half;
-}
-
-Result<KnownPixels> PixelsFrom(const EnhanceOptions& options, bool said, const Result<Reading>& reading,
-                               EnhanceInput& input, EnhanceReport& report) {
-  KnownPixels known;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraPixelSizes sizes,
-                               PixelsOfCameras(options, said || !reading.ok() ? nullptr : &*reading, input, report));
-  if (!said && AreFarOff(double{sizes.median}, reading)) {
-    LogWarning(Cat("ignoring the cameras: their training pixel, ", sizes.median,
-                   ", is far larger than the splat's own, ", reading->pixel,
-                   ". Check their unit and width (--train-width), or pass --mode to trust them"));
-    report.pixel_size_source = PixelSizeSource::kRead;
-    return known;
-  }
-  known.pixel = double{sizes.median};
-  known.sizes = std::move(sizes.sizes);
-  return known;
-}
-
-// How many times larger per side pictures are than those the splat was fitted to, by how well they match it at each
-// size and, if that does not settle it, by its reading.
-Result<int> TimesLarger(const EnhanceOptions& options, const TrainingViews& project, const Reading* reading,
-                        const GaussianCloud& cloud) {
-  RefineOptions refine = options.refine;
-  if (options.background) refine.background = options.background;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureAgreement agreement, MeasureAgreementWith(project, refine, cloud));
-  const int times = TimesLarger(agreement);
-  if (times > 1 || reading == nullptr || agreement.smaller_psnr <= agreement.psnr) return times;
-  CameraSet cameras;
-  cameras.cameras = project.train;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const CameraPixelSizes sizes,
-                               PixelSizesFromCameras(cloud, cameras, options.camera_rule));
-  const std::array<double, 2> shrinks = {1, 1.0 / agreement.smaller};
-  return LikeliestShrink(*reading, double{sizes.median}, shrinks) < 1 ? agreement.smaller : 1;
-}
-
-// Pixel sizes known before the reading.
-Result<KnownPixels> FindKnownPixels(const EnhanceOptions& options, bool with_pictures, bool said,
-                                    const Result<Reading>& reading, EnhanceInput& input, EnhanceReport& report) {
-  if (options.cameras) {
-    report.pixel_size_source = PixelSizeSource::kCameras;
-    return PixelsFrom(options, said, reading, input, report);
-  }
-  if (options.pixel_size) {
-    report.pixel_size_source = PixelSizeSource::kGiven;
-    return KnownPixels{{static_cast<float>(*options.pixel_size)}, options.pixel_size};
-  }
-  if (with_pictures) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(
-        TrainingViews project,
-        OpenProject(options.refine.images,
-                    {.hold_out = 0, .downscale = options.refine.downscale, .origin = options.refine.origin}));
-    EnhanceOptions with_cameras = options;
-    ANCHORSPLAT_ASSIGN_OR_RETURN(
-        input.times_larger, TimesLarger(options, project, said || !reading.ok() ? nullptr : &*reading, input.cloud));
-    with_cameras.cameras.emplace().cameras = std::move(project.train);
-    for (Camera& camera : with_cameras.cameras->cameras) {
-      camera.intrinsics = Scaled(camera.intrinsics, 1.0 / *input.times_larger);
-    }
-    with_cameras.train_width = WidestOf(with_cameras.cameras->cameras);
-    report.pixel_size_source = PixelSizeSource::kPictures;
-    auto known = PixelsFrom(with_cameras, said, reading, input, report);
-    input.cameras.reset();
-    if (*input.times_larger > 1) report.train_width = with_cameras.train_width;
-    return known;
-  }
-  report.pixel_size_source = PixelSizeSource::kRead;
-  return KnownPixels{};
-}
-
-Status CheckPixelOptions(const EnhanceOptions& options) {
-  if (options.pixel_size && !(*options.pixel_size > 0 && std::isfinite(*options.pixel_size))) {
-    return Error{ErrorCode::kBadArgument, Cat("pixel size ", *options.pixel_size, " is not a positive length")};
-  }
-  if (options.pixel_size && options.cameras) {
-    return Error{ErrorCode::kBadArgument,
-                 "a pixel size and cameras exclude each other: cameras already give the pixel size"};
-  }
-  if (options.train_width && !options.cameras) {
-    return Error{ErrorCode::kBadArgument, "--train-width needs --cameras"};
-  }
-  return {};
 }
 
 // Reads the region's Gaussians; outlines of already enhanced ones say nothing about the others' pixels.
@@ -351,7 +194,6 @@ void SayIfUnlike(const EnhanceOptions& options, const EnhanceReport& report) {
 }  // namespace
 
 Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceInput& input, EnhanceReport& report) {
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckPixelOptions(options));
   GaussianCloud& cloud = input.cloud;
   if (ShowsNothing(cloud)) {
     LogWarning(
@@ -371,8 +213,8 @@ Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceI
   const auto reading = part_alone ? ReadInside(*options.region, cloud, model) : Read(cloud, model);
   if (reading.ok()) report.reading = *reading;
   const bool with_pictures = plan.method->takes_start && !options.refine.images.empty();
-  ANCHORSPLAT_ASSIGN_OR_RETURN(KnownPixels known,
-                               FindKnownPixels(options, with_pictures, said, reading, input, report));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(KnownPixels known, FindKnownPixels(options, with_pictures, said,
+                                                                  reading.ok() ? &*reading : nullptr, input, report));
   if (!reading.ok() && !known.pixel) {
     LogWarning(Cat("left unchanged: the pixel size cannot be estimated (", reading.error().message,
                    "). Pass --cameras or --pixel-size"));

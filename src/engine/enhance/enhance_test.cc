@@ -196,14 +196,14 @@ TEST_F(EnhanceTest, FindsTheWidthInTrainingOfLargerPictures) {
   const auto exact = Enhance(cloud, options);
   ASSERT_TRUE(exact.ok());
   EXPECT_FALSE(exact->report.train_width);
-  EXPECT_FALSE(log_->Says("fitted to pictures")) << log_->text();
+  EXPECT_FALSE(log_->Says("fitted to")) << log_->text();
   const int width = options.cameras->cameras[0].intrinsics.width;
   for (Camera& camera : options.cameras->cameras) camera.intrinsics = Scaled(camera.intrinsics, 4);
   const auto larger = Enhance(cloud, options);
   ASSERT_TRUE(larger.ok());
   EXPECT_EQ(larger->report.train_width, width);
   EXPECT_NEAR(larger->report.pixel_size, exact->report.pixel_size, 1e-6);
-  EXPECT_TRUE(log_->Says(Cat("fitted to pictures ", width, " pixels wide, not ", 4 * width))) << log_->text();
+  EXPECT_TRUE(log_->Says(Cat("cameras at ", width, " pixels wide, not ", 4 * width))) << log_->text();
   // Whoever passes a width, or the mode, is believed.
   options.train_width = 4 * width;
   EXPECT_NEAR(Enhance(cloud, options)->report.pixel_size, exact->report.pixel_size / 4, 1e-6);

@@ -181,7 +181,7 @@ Result<GaussianCloud> RunRefinement(const RefineInput& input, const GaussianClou
 
 // Whether the result is better than the start, with the reason if not. On held-out photographs PSNR mostly reflects
 // light and poses, so at about equal PSNR, SSIM decides.
-bool IsWorthIt(const RefinePlan& plan, const Consistency& after) {
+bool IsWorthIt(const RefinePlan& plan, const Consistency& after, bool interrupted) {
   const Consistency& before = plan.start;
   if (after.psnr > before.psnr + plan.least_gain) return true;
   if (!plan.options.images.empty() && plan.least_gain == 0 && after.ssim > before.ssim &&
@@ -190,7 +190,8 @@ bool IsWorthIt(const RefinePlan& plan, const Consistency& after) {
   }
   const std::string numbers = Cat(Fixed(before.psnr, 2), " dB and SSIM ", Fixed(before.ssim, 4), " before, ",
                                   Fixed(after.psnr, 2), " and ", Fixed(after.ssim, 4), " after, at low resolution");
-  LogInfo(after.psnr > before.psnr
+  LogInfo(interrupted ? Cat("stopped early: keeping the start, as refinement is no better so far (", numbers, ")")
+          : after.psnr > before.psnr
               ? Cat("refinement discarded: the splat holds more detail than the pictures, and gained little (", numbers,
                     ")")
               : Cat("refinement discarded: the start matches the views at least as well (", numbers, ")"));
@@ -229,7 +230,7 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
                    " Gaussians with the least opacity × size"));
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(RefineViews views, OpenRefineViews(input, options));
-  if (const int times = input.times_larger.value_or(views.times_larger); times > 1) {
+  if (const int times = views.times_larger; times > 1) {
     LogInfo(Cat("the splat was fitted to pictures at 1/", times, " of this size; using the detail of these"));
     // They show part of the closer view, or all of it.
     input.upscale = std::max(1.0, input.upscale / times);
@@ -261,7 +262,7 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Consistency after,
                                MeasureConsistency(result, upscale, input.cloud, plan.options, views));
   report.after = after.psnr;
-  if (!IsWorthIt(plan, after)) {
+  if (!IsWorthIt(plan, after, report.interrupted)) {
     return timed(KeptStart(WithoutLast(std::move(start), input.fixed), std::move(report)));
   }
   return timed({WithoutLast(std::move(result), input.fixed), std::move(report)});

@@ -189,6 +189,33 @@ Result<PictureAgreement> MeasureAgreement(const GaussianCloud& cloud, const Rend
   return agreement;
 }
 
+Result<PictureAgreement> MeasureSizes(const GaussianCloud& cloud, const RenderOptions& render, PictureCache& pictures) {
+  PictureAgreement agreement;
+  if (render.mode != RenderMode::kClassic) return agreement;
+  const auto count = static_cast<int64_t>(pictures.views().size());
+  ConstantCloud still(cloud);
+  std::vector<Camera> cameras;
+  std::vector<Image> truth;
+  std::vector<Buffer<uint8_t>> ignored;
+  const int64_t looked_at = std::min(count, kMostViews);
+  for (int64_t i = 0; i < looked_at; ++i) {
+    const int64_t view = i * count / looked_at;
+    ANCHORSPLAT_RETURN_IF_ERROR(pictures.Load(view, truth.emplace_back(), ignored.emplace_back()));
+    cameras.push_back(pictures.views()[static_cast<size_t>(view)]);
+  }
+  agreement.views = std::ssize(truth);
+  Rasterizer rasterizer;
+  const auto add = [&](size_t i, RenderOutput& output) -> Status {
+    Clamp01(output.color);
+    FillIgnored(ignored[i], output.color, truth[i]);
+    agreement.psnr += Capped(Psnr(output.color, truth[i])) / static_cast<double>(truth.size());
+    return {};
+  };
+  ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.RenderEach(still, cameras, render, add));
+  ANCHORSPLAT_RETURN_IF_ERROR(MeasureSmaller(still, render, cameras, truth, agreement));
+  return agreement;
+}
+
 int TimesLarger(const PictureAgreement& agreement) {
   return agreement.smaller_psnr > agreement.psnr + kSmallerIsRight ? agreement.smaller : 1;
 }

@@ -34,6 +34,9 @@ inline constexpr int kLeastSide = 24;
 Result<PictureAgreement> MeasureAgreement(const GaussianCloud& cloud, const RenderOptions& render,
                                           PictureCache& pictures);
 
+// Only `views`, `psnr`, `smaller` and `smaller_psnr`.
+Result<PictureAgreement> MeasureSizes(const GaussianCloud& cloud, const RenderOptions& render, PictureCache& pictures);
+
 // How many times larger per side the pictures are than those the splat was fitted to: 1, 2, 4, …
 int TimesLarger(const PictureAgreement& agreement);
 

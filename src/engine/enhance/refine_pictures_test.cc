@@ -83,6 +83,19 @@ TEST_F(Refinement, LargerPicturesAreRefinedAgainstAsTheyAre) {
   EXPECT_NEAR(of_large->report.pixel_size, of_small->report.pixel_size, 1e-6);
   EXPECT_THAT(messages.notes(), testing::Contains(HasSubstr("pictures at 1/4 of this size")));
   EXPECT_GT(PsnrCloser(of_large->cloud), PsnrCloser(of_small->cloud) + 0.5);
+
+  // Also where the pictures only stand beside the cameras.
+  options.mode.reset();
+  options.method = "filter";
+  options.refine = {};
+  const auto cameras = ReadCameras(project() / "transforms.json");
+  ASSERT_TRUE(cameras.ok());
+  options.cameras = *cameras;
+  for (Camera& camera : options.cameras->cameras) camera.intrinsics = Scaled(camera.intrinsics, 4);
+  const auto beside = Enhance(input_.cloud, options);
+  ASSERT_TRUE(beside.ok()) << beside.error().message;
+  EXPECT_EQ(beside->report.train_width, kSide);
+  EXPECT_THAT(messages.notes(), testing::Contains(HasSubstr("fitted to pictures 28 pixels wide, not 112")));
 }
 
 TEST_F(Refinement, PicturesOfSomethingElseAreRefused) {

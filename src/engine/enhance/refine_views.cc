@@ -54,20 +54,23 @@ Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& 
   render.background = BackgroundFor(options, project.background, input.cloud);
   PictureCache pictures(project.train, render.background);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureAgreement agreement, MeasureAgreement(input.cloud, render, pictures));
+  // At the size of the training: at full size, needles may hide everything.
+  const int times = input.times_larger.value_or(TimesLarger(agreement));
+  const auto matched = [&](const PictureAgreement& views) { return times > 1 ? views.smaller_psnr : views.psnr; };
   LogInfo(Cat(project.train.size(), " views with pictures, ", project.held_out.size(),
-              " held out; renders of the splat match them with ", Fixed(agreement.psnr, 2), " dB"));
+              " held out; renders of the splat match them with ", Fixed(matched(agreement), 2), " dB"));
   ANCHORSPLAT_RETURN_IF_ERROR(CheckAgreement(agreement, kLeastInputPsnr, options.align));
   if (!options.hold_out && !project.held_out.empty()) {
     PictureCache held_out(project.held_out, render.background);
     ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureAgreement others, MeasureAgreement(input.cloud, render, held_out));
-    if (HasSeen(agreement.psnr, others.psnr)) {
+    if (HasSeen(matched(agreement), matched(others))) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(
           TrainingViews all,
           OpenProject(options.images, {.hold_out = 0, .downscale = options.downscale, .origin = options.origin}));
       // A project with its own test views always holds those out.
       if (all.held_out.empty()) {
         LogInfo(Cat("training on all views: the splat was fitted to the held-out ones, too (they match with ",
-                    Fixed(others.psnr, 2), " dB). --hold-out N holds some out"));
+                    Fixed(matched(others), 2), " dB). --hold-out N holds some out"));
         project = std::move(all);
         pictures = PictureCache(project.train, render.background);
       }
@@ -77,7 +80,7 @@ Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& 
   return RefineViews{RefineTargets(std::move(pictures)),
                      RefineTargets(PictureCache(SubsampleEvenly(check, kCheckViews), render.background)),
                      agreement.psnr,
-                     TimesLarger(agreement),
+                     times,
                      project.scene_scale,
                      render};
 }
@@ -112,12 +115,12 @@ Result<RefineViews> OpenSplat(const RefineInput& input, const RefineOptions& opt
 
 }  // namespace
 
-Result<PictureAgreement> MeasureAgreementWith(const TrainingViews& project, const RefineOptions& options,
-                                              const GaussianCloud& cloud) {
+Result<PictureAgreement> MeasureSizes(const CameraSet& cameras, const RefineOptions& options,
+                                      const GaussianCloud& cloud) {
   RenderOptions render = DisplayOptions(cloud);
-  render.background = BackgroundFor(options, project.background, cloud);
-  PictureCache pictures(project.train, render.background);
-  return MeasureAgreement(cloud, render, pictures);
+  render.background = BackgroundFor(options, cameras.background, cloud);
+  PictureCache pictures(cameras.cameras, render.background);
+  return MeasureSizes(cloud, render, pictures);
 }
 
 Result<RefineViews> OpenRefineViews(const RefineInput& input, const RefineOptions& options) {

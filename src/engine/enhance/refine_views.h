@@ -24,9 +24,9 @@ struct RefineViews {
   RenderOptions render;
 };
 
-// MeasureAgreement (enhance/refine_pictures.h) with the pictures of `project` over their background.
-Result<PictureAgreement> MeasureAgreementWith(const TrainingViews& project, const RefineOptions& options,
-                                              const GaussianCloud& cloud);
+// PictureAgreement::psnr and `smaller` alone, of views with pictures. `cameras` gives their background.
+Result<PictureAgreement> MeasureSizes(const CameraSet& cameras, const RefineOptions& options,
+                                      const GaussianCloud& cloud);
 
 // Opens the views that `options` and `input` name: pictures, cameras, or poses around the splat. Errors: see Refine.
 Result<RefineViews> OpenRefineViews(const RefineInput& input, const RefineOptions& options);

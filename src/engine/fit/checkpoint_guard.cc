@@ -100,6 +100,11 @@ Status CompareSettings(const std::string& file, const std::string& theirs, const
       return Error{ErrorCode::kBadFile, Cat(file, ": is a checkpoint of another version, without ", key)};
     }
   }
+  for (const auto& [key, value] : a.items()) {
+    if (b.is_object() && b.contains(key)) continue;
+    return Error{ErrorCode::kBadArgument,
+                 Cat(file, ": is a checkpoint of another run: it has ", Spoken(key), ", which is not given here")};
+  }
   return Error{ErrorCode::kBadArgument, Cat(file, ": is a checkpoint of another run")};
 }
 

@@ -37,8 +37,10 @@ Result<UpscalerInfo> ReadInfo(const TensorFile& file) {
   };
   const auto bad = [&](const std::string& why) { return Error{ErrorCode::kBadFile, Cat(file.name(), ": ", why)}; };
   const std::string format = text("format");
-  if (format.empty()) return bad("is no upscaler (metadata \"format\"); scripts/fetch-upscaler.sh makes one");
-  if (format != kUpscalerFormat) return bad(Cat("has the format \"", Printable(format), "\", not ", kUpscalerFormat));
+  if (format != kUpscalerFormat) {
+    return bad(Cat("is no upscaler (its metadata has the format \"", Printable(format), "\", not ", kUpscalerFormat,
+                   "); scripts/fetch-upscaler.sh makes one"));
+  }
   for (const auto& [key, known] : {std::pair{"color_space", "sRGB"}, std::pair{"input_range", "0-1"}}) {
     if (text(key) != known)
       return bad(Cat("has the ", key, " \"", Printable(text(key)), "\"; only ", known, " is known"));

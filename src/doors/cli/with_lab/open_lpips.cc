@@ -15,12 +15,12 @@ Result<std::optional<Lpips>> OpenLpips(const std::string& net, const std::string
   const std::optional<LpipsNet> known = FindLpipsNet(if_there ? "alex" : net);
   if (!known) return std::optional<Lpips>();
   const auto missing = [&](const Error& error) -> Result<std::optional<Lpips>> {
-    if (error.code != ErrorCode::kNotFound) return error;
     if (!if_there) return Error{error.code, Cat(error.message, "; --lpips if-there continues without it")};
     LogWarning(error.message);
     return std::optional<Lpips>();
   };
   const auto weights = ReadLpipsWeights(*known, folder.empty() ? LpipsFolder() : std::filesystem::path(folder));
+  if (!weights.ok() && weights.error().code != ErrorCode::kNotFound) return weights.error();
   if (!weights.ok()) return missing(weights.error());
   auto lpips = Lpips::Open(*weights);
   if (!lpips.ok()) return missing(lpips.error());

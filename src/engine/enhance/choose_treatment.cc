@@ -163,11 +163,13 @@ void SayWhatIsTaken(const Treatment& treatment, const std::string& sizes, const 
 void LeaveNetworkOut(const EnhanceOptions& options, MethodPlan& plan) {
   if (!HasNetwork(plan)) return;
   const std::string name = plan.Name();
+  const bool starts = plan.start != nullptr && plan.start->adds_detail;
   const std::string text =
-      Cat("using the filter, which should do better here than ", name, ". --method ", name, " forces the network");
+      Cat(starts ? "starting from" : "using", " the filter, which should do better here than the network. --method ",
+          name, " forces the network");
   const std::string pointless = WithoutEffect(options, {"model", "copies", "merge-cost", "prune-opacity"});
   pointless.empty() ? LogInfo(text) : LogWarning(text + pointless);
-  if (plan.start != nullptr && plan.start->adds_detail) plan.start = nullptr;
+  if (starts) plan.start = nullptr;
   if (plan.method->adds_detail) plan.method = &FilterMethod();
 }
 
@@ -188,7 +190,8 @@ void SayIfUnlike(const EnhanceOptions& options, const EnhanceReport& report) {
   if (report.train_width && !options.train_width) return;
   const bool given = report.pixel_size_source == PixelSizeSource::kGiven;
   LogInfo(Cat(given ? "--pixel-size " : "the cameras' pixel size, ", pixel, given ? "" : ",",
-              " is outside the splat's own estimate (", reading.low, " to ", reading.high, ")"));
+              " is outside the splat's own estimate (", reading.low, " to ", reading.high, ")",
+              given || pixel > reading.high ? "" : ". If it was fitted to smaller pictures, pass their --train-width"));
 }
 
 }  // namespace

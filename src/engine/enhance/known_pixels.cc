@@ -52,7 +52,10 @@ Result<std::optional<int>> TimesLarger(const EnhanceOptions& options, const Came
   RefineOptions refine = options.refine;
   if (options.background) refine.background = options.background;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureAgreement agreement, MeasureSizes(pictures, refine, cloud));
-  if (agreement.smaller == 1 || std::max(agreement.psnr, agreement.smaller_psnr) < kLeastInputPsnr) {
+  if (agreement.smaller == 1) return std::optional<int>();
+  if (const double best = std::max(agreement.psnr, agreement.smaller_psnr); best < kLeastInputPsnr) {
+    if (options.cameras)
+      LogInfo(Cat("not using the pictures of --cameras: they match the splat at no size (", Fixed(best, 1), " dB)"));
     return std::optional<int>();
   }
   const int times = TimesLarger(agreement);
@@ -64,9 +67,15 @@ Result<std::optional<int>> TimesLarger(const EnhanceOptions& options, const Came
   return std::optional(is_smaller ? agreement.smaller : 1);
 }
 
-// Width in training over that of the cameras, measured on their pictures; unset if those do not tell.
-Result<std::optional<double>> MeasuredShrink(const EnhanceOptions& options, const Reading* reading,
-                                             const GaussianCloud& cloud) {
+// Width in training over that of the cameras, measured on their pictures.
+struct MeasuredWidth {
+  double shrink = 1;
+  bool is_bound = false;  // the pictures are smaller than the cameras say, and match best as they are: or it was larger
+};
+
+// Unset if the pictures do not tell.
+Result<std::optional<MeasuredWidth>> MeasureWidth(const EnhanceOptions& options, const Reading* reading,
+                                                  const GaussianCloud& cloud) {
   CameraSet pictures;
   pictures.background = options.cameras->background;
   std::vector<Camera> views = options.cameras->cameras;
@@ -74,14 +83,14 @@ Result<std::optional<double>> MeasuredShrink(const EnhanceOptions& options, cons
   double matched = 1;
   for (Camera camera : SubsampleEvenly(views, kComparedViews)) {
     const int width = camera.intrinsics.width;
-    if (!MatchPhotograph(camera).ok()) return std::optional<double>();
+    if (!MatchPhotograph(camera).ok()) continue;  // the others tell as well
     matched = static_cast<double>(camera.intrinsics.width) / width;
     pictures.cameras.push_back(std::move(camera));
   }
-  if (pictures.cameras.empty()) return std::optional<double>();
-  const auto times = TimesLarger(options, pictures, reading, cloud);
-  if (!times.ok() || !*times) return std::optional<double>();  // unreadable pictures are not needed here
-  return std::optional(matched / **times);
+  if (pictures.cameras.empty()) return std::optional<MeasuredWidth>();
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<int> times, TimesLarger(options, pictures, reading, cloud));
+  if (!times) return std::optional<MeasuredWidth>();
+  return std::optional(MeasuredWidth{matched / *times, *times == 1 && matched < 1});
 }
 
 // Reduces input.cameras to the size of the training, as far as that is known or likely.
@@ -100,25 +109,30 @@ Status ShrinkToTraining(const EnhanceOptions& options, const Reading* reading, E
     shrink(static_cast<double>(*options.train_width) / widest);
     return {};
   }
-  if (reading != nullptr) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<double> measured, MeasuredShrink(options, reading, input.cloud));
-    if (measured && *measured < 1) {
-      shrink(*measured);
-      LogInfo(Cat("the splat was fitted to pictures ", *report.train_width, " pixels wide, not ", widest,
-                  ": they match it best at that size"));
-      return {};
-    }
-    if (measured) reading = nullptr;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<MeasuredWidth> measured,
+                               MeasureWidth(options, reading, input.cloud));
+  if (measured && measured->shrink < 1 && !(measured->is_bound && reading != nullptr)) {
+    shrink(measured->shrink);
+    LogInfo(Cat("the splat was fitted to pictures ", *report.train_width, " pixels wide, not ", widest,
+                ": they match it best at that size"));
+    return {};
   }
-  report.train_width = AssumedTrainWidth(given);
-  if (report.train_width) input.cameras = AtTrainWidth(given, *report.train_width);
-  if (reading != nullptr) {
+  if (measured && measured->is_bound) {
+    shrink(measured->shrink);
+  } else {
+    report.train_width = AssumedTrainWidth(given);
+    if (report.train_width) input.cameras = AtTrainWidth(given, *report.train_width);
+  }
+  if (reading != nullptr && (!measured || measured->is_bound)) {
     const double assumed = report.train_width.value_or(widest);
     ANCHORSPLAT_ASSIGN_OR_RETURN(const CameraPixelSizes sizes,
                                  PixelSizesFromCameras(input.cloud, *input.cameras, options.camera_rule));
     std::vector<double> shrinks;  // relative to what is assumed
     if (report.train_width) shrinks.push_back(1);
-    for (const double part : kPictureShrinks) shrinks.push_back(part * widest / assumed);
+    for (const double part : kPictureShrinks) {
+      const double relative = part * widest / assumed;
+      if (!measured || relative > 1) shrinks.push_back(relative);  // measured: not smaller
+    }
     const double likeliest = LikeliestShrink(*reading, double{sizes.median}, shrinks);
     if (likeliest != 1 && 2 * sizes.unseen <= input.cloud.size()) {
       shrink(likeliest * assumed / widest);
@@ -129,7 +143,10 @@ Status ShrinkToTraining(const EnhanceOptions& options, const Reading* reading, E
       return {};
     }
   }
-  if (report.train_width) {
+  if (measured && measured->is_bound) {
+    LogInfo(
+        Cat("using the cameras at ", *report.train_width, " pixels wide, the size of their pictures, not ", widest));
+  } else if (report.train_width) {
     LogWarning(Cat("assuming that training shrank the views to ", *report.train_width,
                    " pixels, as INRIA's trainer does. If it did not, pass their width with --train-width"));
   }

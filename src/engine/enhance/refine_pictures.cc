@@ -200,10 +200,15 @@ Result<PictureAgreement> MeasureSizes(const GaussianCloud& cloud, const RenderOp
   const int64_t looked_at = std::min(count, kMostViews);
   for (int64_t i = 0; i < looked_at; ++i) {
     const int64_t view = i * count / looked_at;
-    ANCHORSPLAT_RETURN_IF_ERROR(pictures.Load(view, truth.emplace_back(), ignored.emplace_back()));
+    if (!pictures.Load(view, truth.emplace_back(), ignored.emplace_back()).ok()) {  // the others tell as well
+      truth.pop_back();
+      ignored.pop_back();
+      continue;
+    }
     cameras.push_back(pictures.views()[static_cast<size_t>(view)]);
   }
   agreement.views = std::ssize(truth);
+  if (truth.empty()) return agreement;
   Rasterizer rasterizer;
   const auto add = [&](size_t i, RenderOutput& output) -> Status {
     Clamp01(output.color);

@@ -96,6 +96,18 @@ TEST_F(Refinement, LargerPicturesAreRefinedAgainstAsTheyAre) {
   ASSERT_TRUE(beside.ok()) << beside.error().message;
   EXPECT_EQ(beside->report.train_width, kSide);
   EXPECT_THAT(messages.notes(), testing::Contains(HasSubstr("fitted to pictures 28 pixels wide, not 112")));
+  // Whatever the mode, and with a picture that cannot be read.
+  options.mode = RenderMode::kClassic;
+  std::filesystem::resize_file(project() / (cameras_.cameras[0].name + ".png"), 0);
+  EXPECT_EQ(Enhance(input_.cloud, options)->report.train_width, kSide);
+  // Those of something else tell nothing.
+  for (const Camera& camera : cameras_.cameras) {
+    Image black(4 * kSide, 4 * kSide, 3);
+    std::fill(black.pixels.begin(), black.pixels.end(), 0.0f);
+    ASSERT_TRUE(WritePng(project() / (camera.name + ".png"), black, {.overwrite = true}).ok());
+  }
+  EXPECT_FALSE(Enhance(input_.cloud, options)->report.train_width);
+  EXPECT_THAT(messages.notes(), testing::Contains(HasSubstr("match the splat at no size")));
 }
 
 TEST_F(Refinement, PicturesOfSomethingElseAreRefused) {

@@ -99,7 +99,10 @@ std::string ReadParts(const MethodPlan& plan, TreatmentRequest request, const Tr
     input.by_network = std::move(by_network);
   }
   std::string text = "Leaving";
-  if (!used.empty()) text = Cat("Using ", std::ranges::min(used), " to ", std::ranges::max(used), " in");
+  if (!used.empty()) {
+    const auto [least_used, most_used] = std::ranges::minmax(used);
+    text = Cat("Using ", least_used, least_used < most_used ? Cat(" to ", most_used) : "", " in");
+  }
   const int64_t some = used.empty() ? components.count : std::ssize(used);
   return Cat(text, some < components.count ? Cat(" ", some, " of") : "", " its ", components.count, " separate parts");
 }
@@ -197,6 +200,7 @@ void SayIfUnlike(const EnhanceOptions& options, const EnhanceReport& report) {
 }  // namespace
 
 Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceInput& input, EnhanceReport& report) {
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckPixelOptions(options));
   GaussianCloud& cloud = input.cloud;
   if (ShowsNothing(cloud)) {
     LogWarning(

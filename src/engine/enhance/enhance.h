@@ -46,7 +46,7 @@ struct EnhanceOptions {
   std::optional<double> pixel_size;       // p_LR for all Gaussians; unset: from `cameras`, from the pictures to refine
                                           // against, or read off the splat
   std::optional<CameraSet> cameras;       // training cameras
-  std::optional<int> train_width;         // pixels; see AssumedTrainWidth
+  std::optional<int> train_width;         // of the widest, pixels; unset: see FindKnownPixels
   CameraPixelRule camera_rule = CameraPixelRule::kAuto;
   RefineOptions refine;
   RefineControl control;  // of long-running methods

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -272,6 +273,12 @@ TEST_F(EnhanceTest, RefusesNonsense) {
   options.method = "auto";
   options.upscale = 0.9;
   EXPECT_FALSE(Enhance(Ball(0.01), options).ok());
+  // Whatever the splat shows.
+  options.upscale = 4;
+  options.pixel_size = -1;
+  GaussianCloud invisible = Ball(0.01);
+  std::ranges::fill(invisible.opacity_logits, -20.0f);
+  EXPECT_FALSE(Enhance(invisible, options).ok());
 }
 
 }  // namespace

@@ -29,29 +29,16 @@ void Shrink(double factor, CameraSet& cameras) {
   for (Camera& camera : cameras.cameras) camera.intrinsics = Scaled(camera.intrinsics, factor);
 }
 
-Status CheckPixelOptions(const EnhanceOptions& options) {
-  if (options.pixel_size && !(*options.pixel_size > 0 && std::isfinite(*options.pixel_size))) {
-    return Error{ErrorCode::kBadArgument, Cat("pixel size ", *options.pixel_size, " is not a positive length")};
-  }
-  if (options.pixel_size && options.cameras) {
-    return Error{ErrorCode::kBadArgument,
-                 "a pixel size and cameras exclude each other: cameras already give the pixel size"};
-  }
-  if (!options.train_width) return {};
-  if (!options.cameras) return Error{ErrorCode::kBadArgument, "--train-width needs --cameras"};
-  const int widest = WidestOf(options.cameras->cameras);
-  if (*options.train_width <= widest) return {};
-  return Error{ErrorCode::kBadArgument, Cat("--train-width ", *options.train_width,
-                                            " has no effect: the views are only ", widest, " pixels wide")};
-}
-
 // How many times larger per side pictures are than those the splat was fitted to, by how well they match it at each
-// size and, if that does not settle it, by its reading. Unset if they do not tell, as of compensated splats.
+// size and, if that does not settle it, by its reading. Unset if they do not tell, as of compensated splats. Looks at
+// kComparedViews of them.
 Result<std::optional<int>> TimesLarger(const EnhanceOptions& options, const CameraSet& pictures, const Reading* reading,
                                        const GaussianCloud& cloud) {
   RefineOptions refine = options.refine;
   if (options.background) refine.background = options.background;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureAgreement agreement, MeasureSizes(pictures, refine, cloud));
+  CameraSet compared = pictures;
+  compared.cameras = SubsampleEvenly(pictures.cameras, kComparedViews);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureAgreement agreement, MeasureSizes(compared, refine, cloud));
   if (agreement.smaller == 1) return std::optional<int>();
   if (const double best = std::max(agreement.psnr, agreement.smaller_psnr); best < kLeastInputPsnr) {
     if (options.cameras)
@@ -111,19 +98,20 @@ Status ShrinkToTraining(const EnhanceOptions& options, const Reading* reading, E
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<MeasuredWidth> measured,
                                MeasureWidth(options, reading, input.cloud));
-  if (measured && measured->shrink < 1 && !(measured->is_bound && reading != nullptr)) {
+  const bool is_bound = measured && measured->is_bound;
+  if (measured && measured->shrink < 1 && !is_bound) {
     shrink(measured->shrink);
     LogInfo(Cat("the splat was fitted to pictures ", *report.train_width, " pixels wide, not ", widest,
                 ": they match it best at that size"));
     return {};
   }
-  if (measured && measured->is_bound) {
+  if (is_bound) {
     shrink(measured->shrink);
   } else {
     report.train_width = AssumedTrainWidth(given);
     if (report.train_width) input.cameras = AtTrainWidth(given, *report.train_width);
   }
-  if (reading != nullptr && (!measured || measured->is_bound)) {
+  if (reading != nullptr && (!measured || is_bound)) {
     const double assumed = report.train_width.value_or(widest);
     ANCHORSPLAT_ASSIGN_OR_RETURN(const CameraPixelSizes sizes,
                                  PixelSizesFromCameras(input.cloud, *input.cameras, options.camera_rule));
@@ -131,7 +119,7 @@ Status ShrinkToTraining(const EnhanceOptions& options, const Reading* reading, E
     if (report.train_width) shrinks.push_back(1);
     for (const double part : kPictureShrinks) {
       const double relative = part * widest / assumed;
-      if (!measured || relative > 1) shrinks.push_back(relative);  // measured: not smaller
+      if (!is_bound || relative > 1) shrinks.push_back(relative);
     }
     const double likeliest = LikeliestShrink(*reading, double{sizes.median}, shrinks);
     if (likeliest != 1 && 2 * sizes.unseen <= input.cloud.size()) {
@@ -143,7 +131,7 @@ Status ShrinkToTraining(const EnhanceOptions& options, const Reading* reading, E
       return {};
     }
   }
-  if (measured && measured->is_bound) {
+  if (is_bound) {
     LogInfo(
         Cat("using the cameras at ", *report.train_width, " pixels wide, the size of their pictures, not ", widest));
   } else if (report.train_width) {
@@ -188,9 +176,24 @@ Result<KnownPixels> PixelsOfCameras(CameraPixelRule rule, const Reading* reading
 
 }  // namespace
 
+Status CheckPixelOptions(const EnhanceOptions& options) {
+  if (options.pixel_size && !(*options.pixel_size > 0 && std::isfinite(*options.pixel_size))) {
+    return Error{ErrorCode::kBadArgument, Cat("pixel size ", *options.pixel_size, " is not a positive length")};
+  }
+  if (options.pixel_size && options.cameras) {
+    return Error{ErrorCode::kBadArgument,
+                 "a pixel size and cameras exclude each other: cameras already give the pixel size"};
+  }
+  if (!options.train_width) return {};
+  if (!options.cameras) return Error{ErrorCode::kBadArgument, "--train-width needs --cameras"};
+  const int widest = WidestOf(options.cameras->cameras);
+  if (*options.train_width <= widest) return {};
+  return Error{ErrorCode::kBadArgument, Cat("--train-width ", *options.train_width,
+                                            " has no effect: the views are only ", widest, " pixels wide")};
+}
+
 Result<KnownPixels> FindKnownPixels(const EnhanceOptions& options, bool with_pictures, bool believed,
                                     const Reading* reading, EnhanceInput& input, EnhanceReport& report) {
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckPixelOptions(options));
   if (believed) reading = nullptr;
   if (options.cameras) {
     report.pixel_size_source = PixelSizeSource::kCameras;

@@ -15,6 +15,10 @@ struct KnownPixels {
   std::optional<double> pixel;  // their median
 };
 
+// Errors (kBadArgument): a pixel size that is not positive, or one given along with cameras; a train width without
+// cameras, or above theirs.
+Status CheckPixelOptions(const EnhanceOptions& options);
+
 // Finds the pixel sizes that `options` give, and logs what the user can do better. Cameras of pictures that were shrunk
 // for training are reduced to the size of the training: options.train_width if it is given; else the size at which the
 // pictures, if there are any, match the splat best; else the likeliest by `reading`. Fills input.cameras and
@@ -22,8 +26,8 @@ struct KnownPixels {
 //
 // `with_pictures`: options.refine.images are refined against, and give the cameras if there are no others. `believed`:
 // the cameras' size is right. `reading`: null if there is none.
-// Errors (kBadArgument): a pixel size that is not positive, or one given along with cameras; a train width without
-// cameras, or above theirs; cameras that see none of the Gaussians; those of OpenProject.
+// `options` passed CheckPixelOptions. Errors: kBadArgument: cameras that see none of the Gaussians; those of
+// OpenProject.
 Result<KnownPixels> FindKnownPixels(const EnhanceOptions& options, bool with_pictures, bool believed,
                                     const Reading* reading, EnhanceInput& input, EnhanceReport& report);
 

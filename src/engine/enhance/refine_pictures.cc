@@ -192,14 +192,11 @@ Result<PictureAgreement> MeasureAgreement(const GaussianCloud& cloud, const Rend
 Result<PictureAgreement> MeasureSizes(const GaussianCloud& cloud, const RenderOptions& render, PictureCache& pictures) {
   PictureAgreement agreement;
   if (render.mode != RenderMode::kClassic) return agreement;
-  const auto count = static_cast<int64_t>(pictures.views().size());
   ConstantCloud still(cloud);
   std::vector<Camera> cameras;
   std::vector<Image> truth;
   std::vector<Buffer<uint8_t>> ignored;
-  const int64_t looked_at = std::min(count, kMostViews);
-  for (int64_t i = 0; i < looked_at; ++i) {
-    const int64_t view = i * count / looked_at;
+  for (int64_t view = 0; view < std::ssize(pictures.views()); ++view) {
     if (!pictures.Load(view, truth.emplace_back(), ignored.emplace_back()).ok()) {  // the others tell as well
       truth.pop_back();
       ignored.pop_back();

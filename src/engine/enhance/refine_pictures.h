@@ -34,7 +34,7 @@ inline constexpr int kLeastSide = 24;
 Result<PictureAgreement> MeasureAgreement(const GaussianCloud& cloud, const RenderOptions& render,
                                           PictureCache& pictures);
 
-// Only `views`, `psnr`, `smaller` and `smaller_psnr`.
+// Only `views`, `psnr`, `smaller` and `smaller_psnr`, of all views whose pictures can be read.
 Result<PictureAgreement> MeasureSizes(const GaussianCloud& cloud, const RenderOptions& render, PictureCache& pictures);
 
 // How many times larger per side the pictures are than those the splat was fitted to: 1, 2, 4, …

@@ -24,7 +24,7 @@ struct RefineViews {
   RenderOptions render;
 };
 
-// PictureAgreement::psnr and `smaller` alone, of views with pictures. `cameras` gives their background.
+// MeasureSizes (enhance/refine_pictures.h) of views with pictures, over the background of `options` or `cameras`.
 Result<PictureAgreement> MeasureSizes(const CameraSet& cameras, const RefineOptions& options,
                                       const GaussianCloud& cloud);
 
